@@ -1,0 +1,91 @@
+# Every target works from a bare clone: it sets up `.venv` and builds the bindings when they are out of date.
+# Needed: Rust, Python 3.11 or newer, make. Another interpreter: `make PYTHON=python3.13 test`.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+FIRMWARE := thumbv7em-none-eabihf
+
+TOOLS := $(VENV)/.tools-installed
+NATIVE := $(VENV)/.native-installed
+# Directories are listed too, so that a deleted file counts as a change.
+NATIVE_SOURCES := pyproject.toml Cargo.toml $(wildcard Cargo.lock crates/*/Cargo.toml) $(shell find crates/*/src)
+NATIVE_MISSING := $(if $(wildcard python/gpi_hammerstein/_native*.so),,FORCE)
+
+heading = @printf '\n== %s ==\n' '$(1)'
+
+.DEFAULT_GOAL := help
+# The order of `make test` is part of what it promises, also under `make -j`.
+.NOTPARALLEL:
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench clean FORCE
+
+help: ## List the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
+
+demo: $(NATIVE) ## Run `gpi demo`
+	$(BIN)/gpi demo
+
+test: $(TOOLS) lint-rust test-rust lint-python test-python ## Check and test everything
+
+lint: lint-rust lint-python ## Format, lint and type checks of both languages
+
+lint-rust: ## rustfmt and clippy
+	$(call heading,Rust: format)
+	cargo fmt --all --check
+	$(call heading,Rust: lint)
+	PYO3_PYTHON=$(PYTHON) cargo clippy --workspace --all-targets -- -D warnings
+
+test-rust: ## Firmware build, unit tests, documentation tests, benchmarks in test mode
+	$(call heading,Rust: build without std for $(FIRMWARE))
+	@if [ -d "$$(rustc --print target-libdir --target $(FIRMWARE))" ] || rustup target add $(FIRMWARE); then \
+		cargo build -p gpi-core --no-default-features --target $(FIRMWARE); \
+	else \
+		echo "note: skipped, because the Rust target $(FIRMWARE) cannot be added here"; \
+	fi
+	$(call heading,Rust: tests)
+	cargo test --workspace --exclude gpi-py
+	$(call heading,Rust: tests without default features)
+	cargo test -p gpi-core --no-default-features
+	$(call heading,Rust: benchmarks in test mode)
+	cargo test --benches
+
+lint-python: $(NATIVE) ## ruff, mypy and stubtest
+	$(call heading,Python: lint and format)
+	$(BIN)/python -m ruff check
+	$(BIN)/python -m ruff format --check
+	$(call heading,Python: types)
+	$(BIN)/python -m mypy --strict
+	$(call heading,Python: stub of the compiled module)
+	$(BIN)/python -m mypy.stubtest gpi_hammerstein._native
+
+test-python: $(NATIVE) ## pytest
+	$(call heading,Python: tests)
+	$(BIN)/python -m pytest -n auto
+
+bench: ## Run the benchmarks
+	cargo bench
+
+clean: ## Remove the environment, all builds and all caches
+	cargo clean
+	rm -rf $(VENV) .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -f python/gpi_hammerstein/_native*.so
+	find python benches -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(TOOLS): pyproject.toml
+	$(call heading,Python: environment)
+	@command -v cargo >/dev/null || \
+		{ echo "error: cargo not found: install Rust 1.89 or newer" >&2; exit 1; }
+	@command -v $(PYTHON) >/dev/null || \
+		{ echo "error: $(PYTHON) not found: install Python 3.11 or newer, or name one with 'make PYTHON=...'" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "error: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or newer is needed: name one with 'make PYTHON=...'" >&2; exit 1; }
+	@[ -x $(BIN)/python ] || $(PYTHON) -m venv $(VENV) || \
+		{ rm -rf $(VENV); echo "error: no virtual environment could be made (Debian, Ubuntu: install python3-venv)" >&2; exit 1; }
+	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --group dev
+	@touch $@
+
+$(NATIVE): $(TOOLS) $(NATIVE_SOURCES) $(NATIVE_MISSING)
+	$(call heading,Python: build and install the package)
+	env -u CONDA_PREFIX PIP_QUIET=1 VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/python -m maturin develop --release
+	@touch $@

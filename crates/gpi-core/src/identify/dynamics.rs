@@ -1,0 +1,149 @@
+//! The linear dynamics from their own input v to y.
+
+use crate::linear::{self, Hankel, NormalEquations, StateSpace, bounded};
+use crate::{Error, Experiment, Matrix, Record};
+use nalgebra::DVector;
+
+/// G, and how it explains y from v.
+#[derive(Clone)]
+pub(super) struct Dynamics {
+    /// ERA's singular values, and the poles it reflected.
+    pub singular_values: Vec<f64>,
+    pub reflected: usize,
+    pub refit: Refit,
+}
+
+/// C, D, offsets and free responses fitted to y with the poles kept.
+#[derive(Clone)]
+pub(super) struct Refit {
+    pub system: StateSpace,
+    /// (experiments, outputs).
+    pub offsets: Matrix,
+    /// Root mean square over all outputs.
+    pub rms: f64,
+    criterion: f64,
+}
+
+/// Estimates G from a record whose input is v. ERA gives the poles of each candidate order, least
+/// squares on y the zeros; the order is the one with the least Bayesian information criterion.
+pub(super) fn estimate(
+    record: &Record,
+    taps: usize,
+    ridge: f64,
+    order: Option<usize>,
+    check: &mut dyn FnMut() -> Result<(), Error>,
+) -> Result<Dynamics, Error> {
+    /// Orders that are tried besides the one that the singular values suggest.
+    const SMALL: std::ops::RangeInclusive<usize> = 1..=6;
+    /// A flat tail of singular values that suggests more than this is noise.
+    const LARGEST: usize = 60;
+    let fir = linear::estimate(record, taps, ridge)?;
+    check()?;
+    let hankel = Hankel::new(&fir.markov, None)?;
+    let orders: Vec<usize> = match order {
+        Some(order) => vec![order],
+        None => {
+            let suggested = hankel.suggested_order();
+            let rich = suggested > *SMALL.end() && suggested <= LARGEST;
+            SMALL.chain(rich.then_some(suggested)).collect()
+        }
+    };
+    let mut best: Option<(usize, Refit)> = None;
+    let mut refusal = None;
+    let mut singular_values = Vec::new();
+    // Reflected poles are a sign of states that only follow noise.
+    let better = |reflected: usize, refit: &Refit, (least, best): &(usize, Refit)| {
+        (reflected > 0, refit.criterion) < (*least > 0, best.criterion)
+    };
+    for order in orders.into_iter().filter(|&n| order.is_some() || n <= hankel.rank()) {
+        check()?;
+        let era = match hankel.realize(order) {
+            Ok(era) => era,
+            Err(error) => {
+                refusal = Some(error);
+                continue;
+            }
+        };
+        let refit = refit(record, era.system)?;
+        singular_values = era.singular_values;
+        if best.as_ref().is_none_or(|best| better(era.reflected, &refit, best)) {
+            best = Some((era.reflected, refit));
+        }
+    }
+    match (best, refusal) {
+        (Some((reflected, refit)), _) => Ok(Dynamics { singular_values, reflected, refit }),
+        (None, Some(error)) => Err(error),
+        (None, None) => Err(Error::parameter("taps", taps, "the estimated response is zero")),
+    }
+}
+
+/// Fits C, D, an offset and a free response for each output by least squares, A and B kept.
+pub(super) fn refit(record: &Record, system: StateSpace) -> Result<Refit, Error> {
+    const BLOCK: usize = 1024;
+    let (order, inputs, outputs) = (system.order(), system.inputs(), system.outputs());
+    let count = record.experiments().len();
+    let unknowns = order + inputs + count * (1 + order);
+    let mut equations = NormalEquations::zeros(unknowns, outputs);
+    for (index, experiment) in record.experiments().iter().enumerate() {
+        let states = states(&system, experiment);
+        let samples = experiment.input.nrows();
+        let mut free = system.b().column_sum();
+        let mut row = vec![0.0; unknowns];
+        let mut start = experiment.warmup;
+        while start < samples {
+            let rows = BLOCK.min(samples - start);
+            let mut regressor = Matrix::zeros(unknowns, rows);
+            for (k, mut column) in (start..).zip(regressor.column_iter_mut()) {
+                row[..order].copy_from_slice(states.column(k).as_slice());
+                for input in 0..inputs {
+                    row[order + input] = experiment.input[(k, input)];
+                }
+                let own = order + inputs + index * (1 + order);
+                row[own] = 1.0;
+                if experiment.warmup == 0 {
+                    row[own + 1..own + 1 + order].copy_from_slice(free.as_slice());
+                    free = system.a() * &free;
+                }
+                column.copy_from_slice(&row);
+            }
+            equations.add(&regressor, &experiment.output.rows(start, rows).transpose());
+            start += rows;
+        }
+    }
+    let free = DVector::from_element(unknowns, f64::NEG_INFINITY);
+    let solutions: Vec<DVector<f64>> = (0..outputs)
+        .map(|output| bounded(&equations.gram, &equations.rhs.column(output).into_owned(), &free))
+        .collect();
+    let x = Matrix::from_columns(&solutions);
+    let squares = equations.residual_squares(&x);
+    let samples = record.scored() as f64;
+    let parameters = (order * (inputs + outputs) + inputs * outputs) as f64;
+    let deviance: f64 = squares.iter().map(|sum| samples * (sum / samples).max(1e-300).ln()).sum();
+    let c = x.rows(0, order).transpose();
+    let d = x.rows(order, inputs).transpose();
+    let offsets = Matrix::from_fn(count, outputs, |e, o| x[(order + inputs + e * (1 + order), o)]);
+    Ok(Refit {
+        system: StateSpace::new(system.a().clone(), system.b().clone(), c, d)?,
+        offsets,
+        rms: (squares.sum() / (samples * outputs as f64)).sqrt(),
+        criterion: deviance + parameters * samples.ln(),
+    })
+}
+
+/// The states (order, samples) of a model that stood still before the record.
+fn states(system: &StateSpace, experiment: &Experiment) -> Matrix {
+    let input = experiment.input.transpose();
+    let drive = system.b() * &input;
+    let mut states = Matrix::zeros(system.order(), input.ncols());
+    let mut state = system.equilibrium(&input.column(0).into_owned());
+    let mut next = state.clone();
+    for k in 0..input.ncols() {
+        states.set_column(k, &state);
+        next.copy_from(&drive.column(k));
+        if system.order() > 0 {
+            next.gemv(1.0, system.a(), &state, 1.0);
+        }
+        std::mem::swap(&mut state, &mut next);
+    }
+    states
+}

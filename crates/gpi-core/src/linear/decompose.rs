@@ -1,0 +1,87 @@
+//! Matrix decompositions by faer, on the matrices that the rest of the crate holds.
+
+use crate::{Error, Matrix};
+use faer::{MatRef, Side};
+use nalgebra::DVector;
+use num_complex::Complex64;
+
+/// Singular value decomposition `u diag(s) v^T`, singular values in descending order.
+pub(crate) struct Svd {
+    pub u: Matrix,
+    pub s: Vec<f64>,
+    pub v: Matrix,
+}
+
+fn view(matrix: &Matrix) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
+}
+
+fn owned(matrix: MatRef<'_, f64>) -> Matrix {
+    Matrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)])
+}
+
+fn not_converged(decomposition: &'static str, matrix: &Matrix) -> Error {
+    Error::NotConverged { decomposition, rows: matrix.nrows(), columns: matrix.ncols() }
+}
+
+/// The thin singular value decomposition.
+pub(crate) fn svd(matrix: &Matrix) -> Result<Svd, Error> {
+    let svd = view(matrix)
+        .thin_svd()
+        .map_err(|_| not_converged("singular value decomposition", matrix))?;
+    let s = svd.S().column_vector().iter().copied().collect();
+    Ok(Svd { u: owned(svd.U()), s, v: owned(svd.V()) })
+}
+
+/// The full singular value decomposition: u and v are square.
+pub(crate) fn full_svd(matrix: &Matrix) -> Result<Svd, Error> {
+    let (rows, columns) = matrix.shape();
+    if matrix.is_empty() {
+        let (u, v) = (Matrix::identity(rows, rows), Matrix::identity(columns, columns));
+        return Ok(Svd { u, s: Vec::new(), v });
+    }
+    let svd =
+        view(matrix).svd().map_err(|_| not_converged("singular value decomposition", matrix))?;
+    let s = svd.S().column_vector().iter().copied().collect();
+    Ok(Svd { u: owned(svd.U()), s, v: owned(svd.V()) })
+}
+
+/// Eigenvalues (descending) and eigenvectors of a symmetric matrix; its lower triangle is read.
+pub(crate) fn symmetric_eigen(matrix: &Matrix) -> Result<(DVector<f64>, Matrix), Error> {
+    let eigen = view(matrix)
+        .self_adjoint_eigen(Side::Lower)
+        .map_err(|_| not_converged("symmetric eigendecomposition", matrix))?;
+    let (values, vectors) = (eigen.S().column_vector(), eigen.U());
+    let n = matrix.nrows();
+    let descending = DVector::from_fn(n, |i, _| values[n - 1 - i]);
+    Ok((descending, Matrix::from_fn(n, n, |i, j| vectors[(i, n - 1 - j)])))
+}
+
+/// The eigenvalues of a square matrix.
+pub(crate) fn eigenvalues(matrix: &Matrix) -> Result<Vec<Complex64>, Error> {
+    if matrix.is_empty() {
+        return Ok(Vec::new());
+    }
+    view(matrix).eigenvalues().map_err(|_| not_converged("eigendecomposition", matrix))
+}
+
+/// Eigenvalues and eigenvectors (columns) of a square matrix.
+pub(crate) fn eigen(
+    matrix: &Matrix,
+) -> Result<(DVector<Complex64>, nalgebra::DMatrix<Complex64>), Error> {
+    let eigen = view(matrix).eigen().map_err(|_| not_converged("eigendecomposition", matrix))?;
+    let (values, vectors) = (eigen.S().column_vector(), eigen.U());
+    let n = matrix.nrows();
+    Ok((
+        DVector::from_fn(n, |i, _| values[i]),
+        nalgebra::DMatrix::from_fn(n, n, |i, j| vectors[(i, j)]),
+    ))
+}
+
+/// Solves `matrix x = right`; `None` where the matrix is singular. Nothing to solve is solved.
+pub(crate) fn solve<T: nalgebra::ComplexField>(
+    matrix: nalgebra::DMatrix<T>,
+    right: &nalgebra::DMatrix<T>,
+) -> Option<nalgebra::DMatrix<T>> {
+    if matrix.is_empty() { Some(right.clone()) } else { matrix.lu().solve(right) }
+}

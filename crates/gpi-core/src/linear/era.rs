@@ -1,0 +1,212 @@
+//! The eigensystem realization algorithm: from Markov parameters to a state space.
+
+use super::StateSpace;
+use super::decompose::{Svd, eigen, svd};
+use crate::{Error, Matrix};
+use num_complex::Complex64;
+
+/// What [`realize`] may choose and what is given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EraOptions {
+    /// Number of states; chosen from the singular values when `None`.
+    pub order: Option<usize>,
+    /// Block rows and block columns of the Hankel matrix; `None` takes `(taps - 1) / 2 - 1`, but no
+    /// more than 300 rows or columns: longer ones cost accuracy on noisy taps.
+    pub blocks: Option<usize>,
+}
+
+/// A realization and what its order rests on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Era {
+    /// The realized model, balanced: both Gramians of the finite Hankel matrix are diag(s).
+    pub system: StateSpace,
+    /// All singular values of the block Hankel matrix, descending.
+    pub singular_values: Vec<f64>,
+    /// Unstable poles that were reflected into the unit circle. They come from noise in the taps; a
+    /// mode that matters would have made the taps grow.
+    pub reflected: usize,
+}
+
+/// Realizes Markov parameters H_0, H_1, .. (each outputs x inputs) as a stable state space.
+///
+/// With the singular value decomposition `U S V^T` of the block Hankel matrix `[H_{i+j+1}]` and the
+/// shifted one `[H_{i+j+2}]`: `A = S^-1/2 U^T [H_{i+j+2}] V S^-1/2`, `B = S^1/2 V^T E_1`,
+/// `C = E_1^T U S^1/2`, `D = H_0` (Ho and Kalman 1966; Juang 1994, chapter 5).
+///
+/// A given order is kept. Otherwise the order is where the singular values fall by a factor of 20 at
+/// once, or else where the rest holds less than 1e-4 of the sum of their squares.
+///
+/// ```
+/// use gpi_core::linear::{EraOptions, TransferFunction, realize};
+/// let truth = TransferFunction::new(&[1.0, 0.3], &[1.0, -1.2, 0.6])?.to_state_space();
+/// let era = realize(&truth.markov(41), &EraOptions::default())?;
+/// assert_eq!(era.system.order(), 2);
+/// assert!((era.system.dc_gain()?[0] - truth.dc_gain()?[0]).abs() < 1e-9);
+/// # Ok::<(), gpi_core::Error>(())
+/// ```
+///
+/// # Errors
+/// Too few taps for the order or the blocks, taps of unequal size or not finite, a realization that
+/// cannot be made stable.
+pub fn realize(markov: &[Matrix], options: &EraOptions) -> Result<Era, Error> {
+    let hankel = Hankel::new(markov, options.blocks)?;
+    hankel.realize(options.order.unwrap_or_else(|| hankel.suggested_order()))
+}
+
+/// A decomposed block Hankel matrix, from which models of any order are realized.
+pub(crate) struct Hankel {
+    decomposition: Svd,
+    shifted: Matrix,
+    direct: Matrix,
+}
+
+impl Hankel {
+    /// Largest dimension of a Hankel matrix whose size is not given.
+    const LARGEST: usize = 300;
+
+    pub(crate) fn new(markov: &[Matrix], blocks: Option<usize>) -> Result<Self, Error> {
+        let taps = markov.len();
+        if taps < 3 {
+            let purpose = "Markov parameters for a Hankel matrix".to_owned();
+            return Err(Error::TooFewSamples { samples: taps, needed: 3, purpose });
+        }
+        let (outputs, inputs) = markov[0].shape();
+        let longest = (Self::LARGEST / outputs.max(inputs)).max(1);
+        let blocks = blocks.unwrap_or(((taps - 1) / 2).saturating_sub(1).clamp(1, longest));
+        if blocks == 0 || taps < 2 * blocks + 1 {
+            let requirement =
+                format!("{taps} taps allow between 1 and {} Hankel blocks", (taps - 1) / 2);
+            return Err(Error::parameter("blocks", blocks, requirement));
+        }
+        for tap in markov {
+            Error::require_equal("outputs", ("H_0", outputs), ("another tap", tap.nrows()))?;
+            Error::require_equal("inputs", ("H_0", inputs), ("another tap", tap.ncols()))?;
+            if let Some(value) = tap.iter().find(|value| !value.is_finite()) {
+                return Err(Error::parameter("markov", value, "every element must be finite"));
+            }
+        }
+        let hankel = |shift: usize| {
+            Matrix::from_fn(blocks * outputs, blocks * inputs, |row, column| {
+                markov[shift + row / outputs + column / inputs][(row % outputs, column % inputs)]
+            })
+        };
+        let decomposition = svd(&hankel(1))?;
+        Ok(Self { decomposition, shifted: hankel(2), direct: markov[0].clone() })
+    }
+
+    /// How many singular values are above rounding.
+    pub(crate) fn rank(&self) -> usize {
+        let s = &self.decomposition.s;
+        s.iter().take_while(|&&value| value > 1e-14 * s[0] && value > 0.0).count()
+    }
+
+    /// The order at which the singular values fall off.
+    pub(crate) fn suggested_order(&self) -> usize {
+        choose_order(&self.decomposition.s[..self.rank()])
+    }
+
+    pub(crate) fn realize(&self, order: usize) -> Result<Era, Error> {
+        let rank = self.rank();
+        if order > rank {
+            let requirement =
+                format!("the Hankel matrix has rank {rank}; ask for at most that many states");
+            return Err(Error::parameter("order", order, requirement));
+        }
+        let Svd { u, s, v } = &self.decomposition;
+        let (outputs, inputs) = self.direct.shape();
+        let root = |state: usize| s[state].sqrt();
+        let left = Matrix::from_fn(u.nrows(), order, |i, j| u[(i, j)] / root(j));
+        let right = Matrix::from_fn(v.nrows(), order, |i, j| v[(i, j)] / root(j));
+        let (a, reflected) = stabilize(left.transpose() * &self.shifted * &right)?;
+        let b = Matrix::from_fn(order, inputs, |i, j| v[(j, i)] * root(i));
+        let c = Matrix::from_fn(outputs, order, |i, j| u[(i, j)] * root(j));
+        let system = StateSpace::new(a, b, c, self.direct.clone())?;
+        Ok(Era { system, singular_values: s.clone(), reflected })
+    }
+}
+
+/// The order at which the singular values (descending, positive) fall off.
+fn choose_order(s: &[f64]) -> usize {
+    let significant = s.iter().take_while(|&&value| value >= 0.01 * s[0]).count();
+    let gap = (1..=significant).find(|&n| n == s.len() || s[n - 1] >= 20.0 * s[n]);
+    if let Some(order) = gap {
+        return order;
+    }
+    let total: f64 = s.iter().map(|value| value * value).sum();
+    let mut rest = total;
+    let cut = s.iter().position(|value| {
+        rest -= value * value;
+        rest <= 1e-4 * total
+    });
+    cut.map_or(s.len(), |index| index + 1)
+}
+
+/// Reflects unstable eigenvalues of `a` at the unit circle: z becomes 1 / conj(z).
+fn stabilize(a: Matrix) -> Result<(Matrix, usize), Error> {
+    /// Poles are kept this far inside: below it a transient outlasts any record.
+    const MARGIN: f64 = 1e-6;
+    if a.is_empty() {
+        return Ok((a, 0));
+    }
+    let (values, vectors) = eigen(&a)?;
+    let limit = 1.0 - MARGIN;
+    let reflected = values.iter().filter(|pole| pole.norm() > limit).count();
+    if reflected == 0 {
+        return Ok((a, 0));
+    }
+    let stable = values.map(|pole| {
+        let modulus = pole.norm();
+        if modulus > limit { pole / modulus * (1.0 / modulus).min(limit) } else { pole }
+    });
+    let scaled = &vectors * nalgebra::DMatrix::<Complex64>::from_diagonal(&stable);
+    let modulus = values.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    let remedy = "its poles are defective and cannot be reflected; ask for another order";
+    let inverse = vectors.try_inverse().ok_or(Error::Unstable { modulus, remedy })?;
+    let mended = (scaled * inverse).map(|value| value.re);
+    let radius = super::decompose::eigenvalues(&mended)?;
+    if radius.iter().all(|pole| pole.norm() < 1.0) {
+        Ok((mended, reflected))
+    } else {
+        Err(Error::Unstable { modulus, remedy })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear::TransferFunction;
+
+    #[test]
+    fn two_inputs_and_outputs_are_recovered() {
+        let a = Matrix::from_row_slice(3, 3, &[0.6, 0.3, 0.0, -0.3, 0.6, 0.1, 0.0, 0.2, -0.4]);
+        let b = Matrix::from_row_slice(3, 2, &[1.0, 0.0, 0.5, -1.0, 0.0, 2.0]);
+        let c = Matrix::from_row_slice(2, 3, &[1.0, 0.0, 1.0, 0.0, 1.0, -1.0]);
+        let d = Matrix::from_row_slice(2, 2, &[0.1, 0.0, 0.0, -0.2]);
+        let truth = StateSpace::new(a, b, c, d).unwrap();
+        let era = realize(&truth.markov(41), &EraOptions::default()).unwrap();
+        assert_eq!(era.system.order(), 3);
+        for (found, expected) in era.system.markov(30).iter().zip(truth.markov(30)) {
+            assert!((found - expected).amax() < 1e-10);
+        }
+        assert_eq!(era.singular_values.len(), 2 * 19);
+    }
+
+    #[test]
+    fn unstable_poles_are_reflected_and_counted() {
+        let growing = TransferFunction::new(&[1.0], &[1.0, -1.1]).unwrap().to_state_space();
+        let era = realize(&growing.markov(21), &EraOptions::default()).unwrap();
+        assert_eq!((era.system.order(), era.reflected), (1, 1));
+        assert!((era.system.spectral_radius().unwrap() - 1.0 / 1.1).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_order_above_the_rank_is_refused() {
+        let lag = TransferFunction::new(&[1.0], &[1.0, -0.5]).unwrap().to_state_space();
+        let options = EraOptions { order: Some(4), blocks: None };
+        assert!(matches!(
+            realize(&lag.markov(21), &options),
+            Err(Error::Parameter { name: "order", .. })
+        ));
+        assert!(realize(&lag.markov(2), &EraOptions::default()).is_err());
+    }
+}

@@ -1,0 +1,177 @@
+//! Least squares from normal equations, with rank and condition, free or non-negative.
+
+use super::decompose::symmetric_eigen;
+use crate::{Error, Matrix};
+use nalgebra::DVector;
+
+/// Normal equations `gram x = rhs` of a least squares problem, gathered without its regressor.
+#[derive(Clone, Debug)]
+pub(crate) struct NormalEquations {
+    /// Regressor's transpose times regressor, (unknowns, unknowns).
+    pub gram: Matrix,
+    /// Regressor's transpose times targets, (unknowns, targets).
+    pub rhs: Matrix,
+    /// Sum of squares of each target.
+    pub squares: DVector<f64>,
+}
+
+/// The minimum-norm solution and what its trustworthiness rests on.
+pub(crate) struct Solution {
+    /// (unknowns, targets).
+    pub x: Matrix,
+    /// Singular values of the regressor, descending.
+    pub singular_values: Vec<f64>,
+    /// How many of them exceed the tolerance times the largest.
+    pub rank: usize,
+}
+
+impl NormalEquations {
+    /// No equation yet.
+    pub(crate) fn zeros(unknowns: usize, targets: usize) -> Self {
+        Self {
+            gram: Matrix::zeros(unknowns, unknowns),
+            rhs: Matrix::zeros(unknowns, targets),
+            squares: DVector::zeros(targets),
+        }
+    }
+
+    /// Adds a block of equations: `regressor` is (unknowns, rows), `targets` (targets, rows).
+    pub(crate) fn add(&mut self, regressor: &Matrix, targets: &Matrix) {
+        let transposed = regressor.transpose();
+        self.gram.gemm(1.0, regressor, &transposed, 1.0);
+        self.rhs.gemm(1.0, regressor, &targets.transpose(), 1.0);
+        for (sum, row) in self.squares.iter_mut().zip(targets.row_iter()) {
+            *sum += row.norm_squared();
+        }
+    }
+
+    /// The minimum-norm solution over the directions whose singular value exceeds `tolerance` times
+    /// the largest. Singular values below 1e-8 of the largest are lost in the squares' rounding.
+    ///
+    /// `ridge`, relative to the mean eigenvalue, regularizes by three passes of iterated ridge
+    /// regression, which hardly biases what is well excited.
+    pub(crate) fn solve(&self, tolerance: f64, ridge: f64) -> Result<Solution, Error> {
+        let (eigenvalues, vectors) = symmetric_eigen(&self.gram)?;
+        let singular_values: Vec<f64> = eigenvalues.iter().map(|l| l.max(0.0).sqrt()).collect();
+        let floor = tolerance * singular_values.first().copied().unwrap_or(0.0);
+        let rank = singular_values.iter().take_while(|&&value| value > floor).count();
+        let excited = vectors.columns(0, rank);
+        let mut projected = excited.tr_mul(&self.rhs);
+        let penalty = ridge * eigenvalues.mean();
+        for (mut row, eigenvalue) in projected.row_iter_mut().zip(eigenvalues.iter()) {
+            row *= (1.0 - (penalty / (penalty + eigenvalue)).powi(3)) / eigenvalue;
+        }
+        Ok(Solution { x: excited * projected, singular_values, rank })
+    }
+
+    /// Sum of squared residuals of each target at `x`.
+    pub(crate) fn residual_squares(&self, x: &Matrix) -> DVector<f64> {
+        DVector::from_fn(self.squares.len(), |target, _| {
+            let x = x.column(target);
+            let fitted = (&self.gram * x).dot(&x);
+            (self.squares[target] - 2.0 * x.dot(&self.rhs.column(target)) + fitted).max(0.0)
+        })
+    }
+}
+
+/// Minimises `x^T gram x - 2 x^T rhs` over x with `x[i] >= lower[i]` (Lawson-Hanson active set).
+///
+/// `lower[i] = -inf` leaves an unknown free. Unknowns are scaled to one size first, and what the
+/// equations leave open is drawn towards zero.
+pub(crate) fn bounded(gram: &Matrix, rhs: &DVector<f64>, lower: &DVector<f64>) -> DVector<f64> {
+    /// Relative to the diagonal: far below what data determine, above the rounding of the squares.
+    const REGULARIZATION: f64 = 1e-11;
+    let scale = gram.diagonal().map(|square| if square > 0.0 { square.sqrt() } else { 1.0 });
+    let n = rhs.len();
+    let mut scaled = Matrix::from_fn(n, n, |i, j| gram[(i, j)] / (scale[i] * scale[j]));
+    for i in 0..n {
+        scaled[(i, i)] += REGULARIZATION;
+    }
+    let target = rhs.component_div(&scale);
+    active_set(&scaled, &target, &lower.component_mul(&scale)).component_div(&scale)
+}
+
+fn active_set(gram: &Matrix, rhs: &DVector<f64>, lower: &DVector<f64>) -> DVector<f64> {
+    let n = rhs.len();
+    let mut x = lower.map(|bound| if bound.is_finite() { bound } else { 0.0 });
+    let mut passive: Vec<bool> = lower.iter().map(|bound| !bound.is_finite()).collect();
+    let slack = 1e-12 * (rhs.amax() + (gram * &x).amax());
+    // Each change of the active set lowers the cost; the bound guards against cycling by rounding.
+    for _ in 0..3 * n.max(1) {
+        while passive.iter().any(|&free| free) {
+            let target = passive_solution(gram, rhs, &x, &passive);
+            let mut fraction = 1.0;
+            let mut blocking = None;
+            for i in (0..n).filter(|&i| passive[i] && target[i] < lower[i]) {
+                let step = (x[i] - lower[i]) / (x[i] - target[i]);
+                if step < fraction {
+                    (fraction, blocking) = (step, Some(i));
+                }
+            }
+            x += fraction * (&target - &x);
+            let Some(i) = blocking else { break };
+            x[i] = lower[i];
+            passive[i] = false;
+        }
+        let descent = rhs - gram * &x;
+        let entering = (0..n).filter(|&i| !passive[i] && descent[i] > slack);
+        match entering.max_by(|&i, &j| descent[i].total_cmp(&descent[j])) {
+            Some(i) => passive[i] = true,
+            None => break,
+        }
+    }
+    x
+}
+
+/// The minimum over the passive unknowns, the others held at `x`.
+fn passive_solution(
+    gram: &Matrix,
+    rhs: &DVector<f64>,
+    x: &DVector<f64>,
+    passive: &[bool],
+) -> DVector<f64> {
+    let free: Vec<usize> = (0..x.len()).filter(|&i| passive[i]).collect();
+    let held = DVector::from_fn(x.len(), |i, _| if passive[i] { 0.0 } else { x[i] });
+    let remaining = rhs - gram * held;
+    let reduced = Matrix::from_fn(free.len(), free.len(), |i, j| gram[(free[i], free[j])]);
+    let target = DVector::from_fn(free.len(), |i, _| remaining[free[i]]);
+    let mut solution = x.clone();
+    if let Some(factor) = reduced.cholesky() {
+        let values = factor.solve(&target);
+        for (&i, value) in free.iter().zip(values.iter()) {
+            solution[i] = *value;
+        }
+    }
+    solution
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn minimum_norm_on_a_deficient_regressor() {
+        let mut equations = NormalEquations::zeros(2, 1);
+        equations.add(&Matrix::from_element(2, 3, 1.0), &Matrix::from_element(1, 3, 4.0));
+        let solution = equations.solve(1e-6, 0.0).unwrap();
+        assert_eq!(solution.rank, 1);
+        assert!((solution.x[0] - 2.0).abs() < 1e-12 && (solution.x[1] - 2.0).abs() < 1e-12);
+        assert!(equations.residual_squares(&solution.x)[0] < 1e-12);
+    }
+
+    #[test]
+    fn bounds_hold_and_the_conditions_of_optimality_too() {
+        let a = Matrix::from_fn(30, 5, |i, j| ((i * (j + 2)) as f64 * 0.61).sin() + 0.3);
+        let b = DVector::from_fn(30, |i, _| (i as f64 * 0.37).cos() - 0.4);
+        let (gram, rhs) = (a.tr_mul(&a), a.tr_mul(&b));
+        let lower = DVector::from_vec(vec![0.0, 0.0, f64::NEG_INFINITY, 0.0, -0.1]);
+        let x = bounded(&gram, &rhs, &lower);
+        let gradient = &gram * &x - &rhs;
+        for i in 0..5 {
+            assert!(x[i] >= lower[i]);
+            let at_bound = x[i] == lower[i];
+            assert!(if at_bound { gradient[i] > -1e-9 } else { gradient[i].abs() < 1e-8 });
+        }
+        assert!((0..5).any(|i| x[i] == lower[i]), "the example must exercise a bound");
+    }
+}

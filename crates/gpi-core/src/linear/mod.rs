@@ -1,0 +1,22 @@
+//! The linear dynamics G: estimated, realized, simulated, and run backwards.
+
+mod decompose;
+mod era;
+mod fir;
+mod laurent;
+mod least_squares;
+mod state_space;
+mod transfer_function;
+mod zero_order_hold;
+mod zeros;
+
+pub use era::{Era, EraOptions, realize};
+pub use fir::{Fir, estimate};
+pub use laurent::{IntermediateSignal, InverseOptions, NoncausalFir, ZERO_TOLERANCE};
+pub use state_space::StateSpace;
+pub use transfer_function::TransferFunction;
+pub use zero_order_hold::zero_order_hold;
+
+pub(crate) use era::Hankel;
+pub(crate) use fir::excitation_limit;
+pub(crate) use least_squares::{NormalEquations, bounded};

@@ -1,0 +1,364 @@
+//! The identified model: one hysteresis per input, then the linear dynamics.
+
+use crate::linear::StateSpace;
+use crate::operators::{Gpi, GpiState, Operator};
+use crate::{Channel, Error, Matrix, Record};
+use nalgebra::DVector;
+
+/// The hysteresis of one input: envelope and plays with parameters on the heap.
+pub type Hysteresis = Gpi<Vec<f64>, Vec<f64>>;
+
+/// `y = G(q) P[D[u]] + offset`, in the units of the record it was identified from.
+///
+/// G has unit DC gain where one input drives one output (minus one where the output falls when the
+/// input rises, since the play weights are not negative); the gain is carried by the play weights.
+/// With more channels the largest DC gain of every column of G is plus or minus one.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Model {
+    schema: String,
+    rate: f64,
+    inputs: Vec<Channel>,
+    outputs: Vec<Channel>,
+    hysteresis: Vec<Hysteresis>,
+    linear: StateSpace,
+    offsets: Vec<f64>,
+}
+
+/// Everything a [`Model`] remembers between two samples.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ModelState {
+    /// One state per input.
+    pub hysteresis: Vec<GpiState<f64, Vec<f64>>>,
+    /// The state x of the linear dynamics.
+    pub linear: DVector<f64>,
+}
+
+/// How far a simulation is from a measurement, over all outputs and scored samples.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct SimulationError {
+    /// Root mean square error, in the output's unit.
+    pub rms: f64,
+    /// `rms` over the span (largest minus smallest value) of the measured output; with several
+    /// outputs, over the root mean square of their spans.
+    pub nrmse: f64,
+    /// `100 (1 - |y - y_hat| / |y - mean(y)|)`, the fit of MATLAB's `compare`.
+    pub fit_percent: f64,
+    /// The largest absolute error.
+    pub max: f64,
+}
+
+impl Model {
+    /// The schema that model files name.
+    pub const SCHEMA: &'static str = "gpi-model/1";
+
+    /// A model from its parts; `offsets` has one constant per output.
+    ///
+    /// # Errors
+    /// Parts whose channels do not fit together.
+    pub fn new(
+        rate: f64,
+        inputs: Vec<Channel>,
+        outputs: Vec<Channel>,
+        hysteresis: Vec<Hysteresis>,
+        linear: StateSpace,
+        offsets: Vec<f64>,
+    ) -> Result<Self, Error> {
+        let schema = Self::SCHEMA.to_owned();
+        let model = Self { schema, rate, inputs, outputs, hysteresis, linear, offsets };
+        model.validate()?;
+        Ok(model)
+    }
+
+    fn validate(&self) -> Result<(), Error> {
+        let (inputs, outputs) = (self.inputs.len(), self.outputs.len());
+        Error::require_equal("inputs", ("names", inputs), ("hysteresis", self.hysteresis.len()))?;
+        Error::require_equal("inputs", ("names", inputs), ("linear", self.linear.inputs()))?;
+        Error::require_equal("outputs", ("names", outputs), ("linear", self.linear.outputs()))?;
+        Error::require_equal("outputs", ("names", outputs), ("offsets", self.offsets.len()))?;
+        if self.rate.is_finite() && self.rate > 0.0 {
+            Ok(())
+        } else {
+            Err(Error::parameter("rate", self.rate, "the sampling rate in Hz must be positive"))
+        }
+    }
+
+    /// Sampling rate in Hz.
+    pub fn rate(&self) -> f64 {
+        self.rate
+    }
+
+    /// The input channels.
+    pub fn inputs(&self) -> &[Channel] {
+        &self.inputs
+    }
+
+    /// The output channels.
+    pub fn outputs(&self) -> &[Channel] {
+        &self.outputs
+    }
+
+    /// The hysteresis of each input.
+    pub fn hysteresis(&self) -> &[Hysteresis] {
+        &self.hysteresis
+    }
+
+    /// The linear dynamics G.
+    pub fn linear(&self) -> &StateSpace {
+        &self.linear
+    }
+
+    /// The constant term of each output, in its unit.
+    pub fn offsets(&self) -> &[f64] {
+        &self.offsets
+    }
+
+    /// The state of an actuator that was raised from zero to `input` (one value per input) once and
+    /// has stood there until all transients died out.
+    ///
+    /// # Errors
+    /// Another number of values than inputs.
+    pub fn start(&self, input: &[f64]) -> Result<ModelState, Error> {
+        Error::require_equal(
+            "inputs",
+            ("input", input.len()),
+            ("hysteresis", self.hysteresis.len()),
+        )?;
+        let mut driven = DVector::zeros(input.len());
+        let mut states = Vec::new();
+        for ((hysteresis, &value), v) in self.hysteresis.iter().zip(input).zip(driven.iter_mut()) {
+            let mut state = hysteresis.rest();
+            *v = hysteresis.step(&mut state, value);
+            states.push(state);
+        }
+        Ok(ModelState { hysteresis: states, linear: self.linear.equilibrium(&driven) })
+    }
+
+    /// The intermediate signals v (samples, inputs) of an input (samples, inputs); `states` move on.
+    ///
+    /// # Errors
+    /// Another number of channels or states than inputs.
+    pub fn intermediate_from(
+        &self,
+        states: &mut [GpiState<f64, Vec<f64>>],
+        input: &Matrix,
+    ) -> Result<Matrix, Error> {
+        let inputs = self.hysteresis.len();
+        Error::require_equal("channels", ("input", input.ncols()), ("hysteresis", inputs))?;
+        Error::require_equal("channels", ("state", states.len()), ("hysteresis", inputs))?;
+        let mut v = input.clone();
+        let samples = input.nrows();
+        let columns = v.as_mut_slice().chunks_exact_mut(samples.max(1));
+        for ((hysteresis, state), column) in self.hysteresis.iter().zip(states).zip(columns) {
+            hysteresis.in_place(state, column);
+        }
+        Ok(v)
+    }
+
+    /// The outputs (samples, outputs) for an input (samples, inputs); `state` moves on, so that a
+    /// record simulated in parts equals the whole.
+    ///
+    /// # Errors
+    /// Another number of channels than inputs.
+    pub fn simulate_from(&self, state: &mut ModelState, input: &Matrix) -> Result<Matrix, Error> {
+        let v = self.intermediate_from(&mut state.hysteresis, input)?;
+        let mut output = self.linear.simulate_from(&mut state.linear, &v)?;
+        for (mut column, offset) in output.column_iter_mut().zip(&self.offsets) {
+            column.add_scalar_mut(*offset);
+        }
+        Ok(output)
+    }
+
+    /// The outputs of an actuator that stood at the first input before the record began, see
+    /// [`Model::start`].
+    ///
+    /// # Errors
+    /// No sample, another number of channels than inputs.
+    pub fn simulate(&self, input: &Matrix) -> Result<Matrix, Error> {
+        self.simulate_from(&mut self.start_of(input)?, input)
+    }
+
+    /// The intermediate signals v (samples, inputs) that belong to [`Model::simulate`].
+    ///
+    /// # Errors
+    /// No sample, another number of channels than inputs.
+    pub fn intermediate(&self, input: &Matrix) -> Result<Matrix, Error> {
+        self.intermediate_from(&mut self.start_of(input)?.hysteresis, input)
+    }
+
+    fn start_of(&self, input: &Matrix) -> Result<ModelState, Error> {
+        if input.nrows() == 0 {
+            let purpose = "a simulation".to_owned();
+            return Err(Error::TooFewSamples { samples: 0, needed: 1, purpose });
+        }
+        self.start(&input.row(0).iter().copied().collect::<Vec<_>>())
+    }
+
+    /// Measured minus simulated output of every experiment, (samples, outputs), warm-up included.
+    ///
+    /// # Errors
+    /// Another number of channels than the model's.
+    pub fn residuals(&self, record: &Record) -> Result<Vec<Matrix>, Error> {
+        let outputs = ("record's outputs", record.outputs().len());
+        Error::require_equal("outputs", outputs, ("model's outputs", self.outputs.len()))?;
+        let residual = |e: &crate::Experiment| Ok(&e.output - self.simulate(&e.input)?);
+        record.experiments().iter().map(residual).collect()
+    }
+
+    /// The simulation error over the scored samples of a record; `remove_mean` takes the mean of
+    /// each experiment's residual out first, for sensors whose offset moves between experiments.
+    ///
+    /// # Errors
+    /// Another number of channels than the model's.
+    pub fn error(&self, record: &Record, remove_mean: bool) -> Result<SimulationError, Error> {
+        let residuals = self.residuals(record)?;
+        Ok(SimulationError::of(record, &residuals, remove_mean))
+    }
+
+    /// The model as JSON of the schema [`Model::SCHEMA`].
+    ///
+    /// # Errors
+    /// A parameter that JSON cannot hold.
+    pub fn to_json(&self) -> Result<String, Error> {
+        serde_json::to_string_pretty(self)
+            .map_err(|error| Error::ModelFile { reason: error.to_string() })
+    }
+
+    /// Reads what [`Model::to_json`] wrote.
+    ///
+    /// # Errors
+    /// A schema that this version does not know, text that is not a model.
+    pub fn from_json(text: &str) -> Result<Self, Error> {
+        let reason = |error: serde_json::Error| Error::ModelFile { reason: error.to_string() };
+        let value: serde_json::Value = serde_json::from_str(text).map_err(reason)?;
+        match value.get("schema").and_then(serde_json::Value::as_str) {
+            Some(Self::SCHEMA) => {}
+            Some(found) => {
+                return Err(Error::Schema { found: found.to_owned(), expected: Self::SCHEMA });
+            }
+            None => {
+                return Err(Error::ModelFile { reason: "it names no `schema`".to_owned() });
+            }
+        }
+        let model: Self = serde_json::from_value(value).map_err(reason)?;
+        // Built once more through the constructors, which refuse what does not fit together.
+        for hysteresis in &model.hysteresis {
+            let (envelope, plays) = (hysteresis.envelope(), hysteresis.plays());
+            let (g, p) = (envelope.weights().to_vec(), plays.weights().to_vec());
+            let thresholds = envelope.thresholds().to_vec();
+            crate::operators::Deadzones::new(thresholds, g, envelope.reading())?;
+            crate::operators::PlayBank::new(plays.half_widths().to_vec(), p)?;
+        }
+        let g = &model.linear;
+        StateSpace::new(g.a().clone(), g.b().clone(), g.c().clone(), g.d().clone())?;
+        model.validate()?;
+        Ok(model)
+    }
+}
+
+impl SimulationError {
+    /// The error of residuals (one matrix an experiment) over the scored samples of a record.
+    pub fn of(record: &Record, residuals: &[Matrix], remove_mean: bool) -> Self {
+        let (mut squares, mut variation, mut span_squares, mut max) = (0.0, 0.0, 0.0, 0.0_f64);
+        let count = record.scored() as f64;
+        for output in 0..record.outputs().len() {
+            let (mut low, mut high, mut sum) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+            for (experiment, residual) in record.experiments().iter().zip(residuals) {
+                let rows = experiment.output.nrows() - experiment.warmup;
+                let residual = residual.view((experiment.warmup, output), (rows, 1));
+                let measured = experiment.output.view((experiment.warmup, output), (rows, 1));
+                let mean = if remove_mean { residual.mean() } else { 0.0 };
+                for (&error, &value) in residual.iter().zip(measured.iter()) {
+                    squares += (error - mean).powi(2);
+                    max = max.max((error - mean).abs());
+                    (low, high, sum) = (low.min(value), high.max(value), sum + value);
+                }
+            }
+            let mean = sum / count;
+            for experiment in record.experiments() {
+                let measured = experiment.output.column(output);
+                let scored = measured.iter().skip(experiment.warmup);
+                variation += scored.map(|value| (value - mean).powi(2)).sum::<f64>();
+            }
+            span_squares += (high - low).powi(2);
+        }
+        let outputs = record.outputs().len() as f64;
+        let rms = (squares / (count * outputs)).sqrt();
+        Self {
+            rms,
+            nrmse: rms / (span_squares / outputs).sqrt(),
+            fit_percent: 100.0 * (1.0 - (squares / variation).sqrt()),
+            max,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear::TransferFunction;
+    use crate::operators::{Deadzones, PlayBank, Reading};
+
+    pub(crate) fn example() -> Model {
+        let envelope = Deadzones::new(vec![0.0, 1.0], vec![1.0, -0.3], Reading::OneSided).unwrap();
+        let plays = PlayBank::new(vec![0.0, 0.4], vec![2.0, 1.0]).unwrap();
+        let linear = TransferFunction::new(&[0.5], &[1.0, -0.5]).unwrap().to_state_space();
+        let channel = |name: &str| vec![Channel::new(name, "")];
+        let hysteresis = vec![Gpi::new(envelope, plays)];
+        Model::new(100.0, channel("u"), channel("y"), hysteresis, linear, vec![7.0]).unwrap()
+    }
+
+    #[test]
+    fn json_round_trip_is_exact() {
+        let model = example();
+        assert_eq!(Model::from_json(&model.to_json().unwrap()).unwrap(), model);
+    }
+
+    #[test]
+    fn foreign_schemas_are_refused() {
+        let text = example().to_json().unwrap().replace("gpi-model/1", "gpi-model/9");
+        assert!(matches!(
+            Model::from_json(&text),
+            Err(Error::Schema { found, .. }) if found == "gpi-model/9"
+        ));
+        assert!(matches!(Model::from_json("{}"), Err(Error::ModelFile { .. })));
+        assert!(matches!(Model::from_json("no json"), Err(Error::ModelFile { .. })));
+    }
+
+    #[test]
+    fn a_model_continues_from_a_saved_state() {
+        let model = example();
+        let input = Matrix::from_fn(60, 1, |k, _| 2.0 * (k as f64 * 0.3).sin() + 1.0);
+        let whole = model.simulate(&input).unwrap();
+        let mut state = model.start(&[1.0]).unwrap();
+        let first = model.simulate_from(&mut state, &input.rows(0, 25).into_owned()).unwrap();
+        let text = serde_json::to_string(&state).unwrap();
+        let mut state: ModelState = serde_json::from_str(&text).unwrap();
+        let rest = model.simulate_from(&mut state, &input.rows(25, 35).into_owned()).unwrap();
+        assert_eq!(whole.rows(0, 25), first);
+        assert_eq!(whole.rows(25, 35), rest);
+    }
+
+    #[test]
+    fn a_standing_actuator_stands_still() {
+        let model = example();
+        let output = model.simulate(&Matrix::from_element(20, 1, 1.5)).unwrap();
+        assert!(output.iter().all(|value| (value - output[0]).abs() < 1e-12));
+    }
+
+    #[test]
+    fn errors_are_those_of_the_definitions() {
+        let channel = |name: &str| vec![Channel::new(name, "")];
+        let run = crate::Experiment {
+            input: Matrix::zeros(4, 1),
+            output: Matrix::from_column_slice(4, 1, &[9.0, 0.0, 2.0, 4.0]),
+            covariates: Matrix::zeros(4, 0),
+            warmup: 1,
+        };
+        let record = Record::new(vec![run], 1.0, channel("u"), channel("y"), vec![]).unwrap();
+        let residual = [Matrix::from_column_slice(4, 1, &[100.0, 1.0, 1.0, 1.0])];
+        let error = SimulationError::of(&record, &residual, false);
+        assert_eq!((error.rms, error.nrmse, error.max), (1.0, 0.25, 1.0));
+        assert!((error.fit_percent - 100.0 * (1.0 - (3.0_f64 / 8.0).sqrt())).abs() < 1e-12);
+        assert_eq!(SimulationError::of(&record, &residual, true).rms, 0.0);
+    }
+}

@@ -1,0 +1,153 @@
+//! The envelope D: a weighted sum of deadzones.
+
+use super::error::{require_finite, require_length};
+use super::{Operator, OperatorError, Sample, Storage};
+
+/// How the deadzone Z_eta is read; the paper's text and its equation (3) disagree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "identify", serde(rename_all = "kebab-case"))]
+pub enum Reading {
+    /// Memoryless, as the text says: eta > 0: `max(u - eta, 0)`; eta < 0: `min(u - eta, 0)`;
+    /// eta = 0: `u`.
+    #[default]
+    OneSided,
+    /// Equation (3) exactly as printed: `u - eta` while u rises above eta, `u + eta` while u falls
+    /// below -eta, 0 otherwise. It depends on the previous input, so it is not memoryless.
+    Directional,
+}
+
+/// A weighted sum of deadzones, equation (2) of the paper: `z(k) = sum_j g_j Z_{eta_j}[u](k)`.
+///
+/// Thresholds have the unit of the input; weights are slopes (unit of z per unit of u).
+///
+/// ```
+/// use gpi_core::operators::{Deadzones, Operator, Reading};
+/// let envelope = Deadzones::new([0.0, 1.0], [1.0, -0.5], Reading::OneSided)?;
+/// let mut z = [-2.0, 0.5, 1.0, 3.0];
+/// envelope.in_place(&mut envelope.rest(), &mut z);
+/// assert_eq!(z, [-2.0, 0.5, 1.0, 2.0]); // slope 1, from u = 1 on slope 0.5
+/// # Ok::<(), gpi_core::operators::OperatorError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
+pub struct Deadzones<S> {
+    thresholds: S,
+    weights: S,
+    reading: Reading,
+}
+
+/// The previous input u(k-1), which the [`Reading::Directional`] deadzone compares with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
+pub struct DeadzonesState<T> {
+    /// u(k-1), zero at rest.
+    pub previous: T,
+}
+
+impl<S: Storage> Deadzones<S> {
+    /// An envelope of deadzones with thresholds eta_j and weights g_j of any sign.
+    ///
+    /// # Errors
+    /// Arrays of different length, elements that are not finite.
+    pub fn new(thresholds: S, weights: S, reading: Reading) -> Result<Self, OperatorError> {
+        require_length("weights", weights.values().len(), thresholds.values().len())?;
+        require_finite("thresholds", thresholds.values())?;
+        require_finite("weights", weights.values())?;
+        Ok(Self { thresholds, weights, reading })
+    }
+
+    /// The thresholds eta_j, in the input's unit.
+    pub fn thresholds(&self) -> &[S::Item] {
+        self.thresholds.values()
+    }
+
+    /// The weights g_j.
+    pub fn weights(&self) -> &[S::Item] {
+        self.weights.values()
+    }
+
+    /// How the deadzones are read.
+    pub fn reading(&self) -> Reading {
+        self.reading
+    }
+
+    /// Z_eta of one sample, without its weight; `previous` is u(k-1).
+    #[inline]
+    pub fn zone(&self, threshold: S::Item, previous: S::Item, input: S::Item) -> S::Item {
+        let zero = S::Item::ZERO;
+        match self.reading {
+            Reading::OneSided => {
+                let beyond = input - threshold;
+                if threshold == zero
+                    || (threshold > zero && beyond > zero)
+                    || (threshold < zero && beyond < zero)
+                {
+                    beyond
+                } else {
+                    zero
+                }
+            }
+            Reading::Directional => {
+                if input > previous && input > threshold {
+                    input - threshold
+                } else if input < previous && input < -threshold {
+                    input + threshold
+                } else {
+                    zero
+                }
+            }
+        }
+    }
+}
+
+impl<S: Storage> Operator for Deadzones<S> {
+    type Sample = S::Item;
+    type State = DeadzonesState<S::Item>;
+
+    /// The previous input is zero.
+    fn rest(&self) -> DeadzonesState<S::Item> {
+        DeadzonesState { previous: S::Item::ZERO }
+    }
+
+    #[inline]
+    fn step(&self, state: &mut DeadzonesState<S::Item>, input: S::Item) -> S::Item {
+        let mut sum = S::Item::ZERO;
+        for (&threshold, &weight) in self.thresholds.values().iter().zip(self.weights.values()) {
+            sum = sum + weight * self.zone(threshold, state.previous, input);
+        }
+        state.previous = input;
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn zones(threshold: f64, reading: Reading, input: &[f64]) -> Vec<f64> {
+        let zone = Deadzones::new([threshold], [1.0], reading).unwrap();
+        let mut output = input.to_vec();
+        zone.in_place(&mut zone.rest(), &mut output);
+        output
+    }
+
+    #[test]
+    fn one_sided_is_the_usual_deadzone() {
+        let input = [-3.0, -1.0, 0.0, 1.0, 3.0];
+        assert_eq!(zones(2.0, Reading::OneSided, &input), [0.0, 0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(zones(-2.0, Reading::OneSided, &input), [-1.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(zones(0.0, Reading::OneSided, &input), input);
+    }
+
+    #[test]
+    fn directional_is_equation_3_as_printed() {
+        let input = [1.0, 3.0, 3.0, 2.5, -1.0, -3.0, -2.0];
+        assert_eq!(zones(2.0, Reading::Directional, &input), [0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0]);
+        // a negative threshold lets both branches act at once: the direction decides
+        assert_eq!(
+            zones(-2.0, Reading::Directional, &input),
+            [3.0, 5.0, 0.0, 0.0, -3.0, -5.0, 0.0]
+        );
+    }
+}

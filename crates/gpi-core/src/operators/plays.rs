@@ -1,0 +1,173 @@
+//! The play operator F and the weighted bank P of plays.
+
+use super::error::{require_finite, require_length};
+use super::{Operator, OperatorError, Sample, Storage};
+
+/// One step of the play operator, equation (7) of the paper:
+/// `F(k) = max(z(k) - r, min(z(k) + r, F(k-1)))`.
+///
+/// `half_width` is r, half the width of the gap in which the output sticks; `input` is z(k),
+/// `previous` is F(k-1), all in the same unit. A NaN input leaves the play where it is.
+///
+/// ```
+/// use gpi_core::operators::play;
+/// assert_eq!(play(0.3, 1.0, 0.0), 0.7); // pushed up: slides at z - r
+/// assert_eq!(play(0.3, 0.5, 0.7), 0.7); // inside the gap: sticks
+/// assert_eq!(play(0.3, 0.0, 0.7), 0.3); // pushed down: slides at z + r
+/// ```
+#[inline]
+pub fn play<T: Sample>(half_width: T, input: T, previous: T) -> T {
+    let lower = input - half_width;
+    let upper = input + half_width;
+    if lower > previous {
+        lower
+    } else if upper < previous {
+        upper
+    } else {
+        previous
+    }
+}
+
+/// A weighted bank of plays, equation (11) of the paper: `v(k) = sum_i p_i F_{r_i}[z](k)`.
+///
+/// `S` is `[T; N]` on firmware or `Vec<T>` on a host; T is `f32` or `f64`.
+///
+/// ```
+/// use gpi_core::operators::{Operator, PlayBank};
+/// let bank = PlayBank::new([0.1, 0.2, 0.3, 0.4], [0.25; 4])?;
+/// let mut v = [0.0, 0.2, 0.5, 1.1, 1.25, 1.0, 0.2, -1.0];
+/// bank.in_place(&mut bank.rest(), &mut v);
+/// for (value, expected) in v.iter().zip([0.0, 0.025, 0.25, 0.85, 1.0, 0.9875, 0.45, -0.75]) {
+///     assert!((value - expected as f64).abs() < 1e-15);
+/// }
+/// # Ok::<(), gpi_core::operators::OperatorError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
+pub struct PlayBank<S> {
+    half_widths: S,
+    weights: S,
+}
+
+/// The outputs F_{r_i}(k-1) of the plays of a [`PlayBank`], in the bank's order, in the input's unit.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
+pub struct PlayBankState<S> {
+    plays: S,
+}
+
+impl<S: Storage> PlayBank<S> {
+    /// A bank of plays with half-widths r_i >= 0 and weights p_i of any sign.
+    ///
+    /// # Errors
+    /// Arrays of different length, elements that are not finite, negative half-widths.
+    pub fn new(half_widths: S, weights: S) -> Result<Self, OperatorError> {
+        require_length("weights", weights.values().len(), half_widths.values().len())?;
+        require_finite("half_widths", half_widths.values())?;
+        require_finite("weights", weights.values())?;
+        match half_widths.values().iter().position(|&r| r < S::Item::ZERO) {
+            Some(index) => Err(OperatorError::Negative { parameter: "half_widths", index }),
+            None => Ok(Self { half_widths, weights }),
+        }
+    }
+
+    /// The half-widths r_i, in the input's unit.
+    pub fn half_widths(&self) -> &[S::Item] {
+        self.half_widths.values()
+    }
+
+    /// The weights p_i, in units of output per unit of input.
+    pub fn weights(&self) -> &[S::Item] {
+        self.weights.values()
+    }
+
+    /// The state in which every play's output equals `input`: no hysteresis is left over from the
+    /// past, as after a decaying oscillation around `input`.
+    pub fn settled(&self, input: S::Item) -> PlayBankState<S> {
+        PlayBankState { plays: self.half_widths.filled(input) }
+    }
+
+    /// A state from saved play outputs, each clamped by the next sample as (7) does.
+    ///
+    /// # Errors
+    /// Another length than the bank's, elements that are not finite.
+    pub fn state_from(&self, plays: S) -> Result<PlayBankState<S>, OperatorError> {
+        require_length("state", plays.values().len(), self.half_widths.values().len())?;
+        require_finite("state", plays.values())?;
+        Ok(PlayBankState { plays })
+    }
+}
+
+impl<S: Storage> PlayBankState<S> {
+    /// The play outputs, for saving.
+    pub fn plays(&self) -> &[S::Item] {
+        self.plays.values()
+    }
+}
+
+impl<S: Storage> Operator for PlayBank<S> {
+    type Sample = S::Item;
+    type State = PlayBankState<S>;
+
+    /// All plays at zero; the first sample then gives F(0) = clamp(0, z(0) - r, z(0) + r).
+    fn rest(&self) -> PlayBankState<S> {
+        PlayBankState { plays: self.half_widths.filled(S::Item::ZERO) }
+    }
+
+    #[inline]
+    fn step(&self, state: &mut PlayBankState<S>, input: S::Item) -> S::Item {
+        let mut sum = S::Item::ZERO;
+        let configuration = self.half_widths.values().iter().zip(self.weights.values());
+        for ((&half_width, &weight), output) in configuration.zip(state.plays.values_mut()) {
+            *output = play(half_width, input, *output);
+            sum = sum + weight * *output;
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn length_mismatch_is_named() {
+        let error = PlayBank::new(vec![0.0, 1.0], vec![1.0]).unwrap_err();
+        assert_eq!(
+            error,
+            OperatorError::LengthMismatch { parameter: "weights", length: 1, expected: 2 }
+        );
+    }
+
+    #[test]
+    fn negative_half_width_is_named() {
+        let error = PlayBank::new([0.0, -1.0], [1.0, 1.0]).unwrap_err();
+        assert_eq!(error, OperatorError::Negative { parameter: "half_widths", index: 1 });
+        assert!(PlayBank::new([f64::NAN], [1.0]).is_err());
+        assert!(PlayBank::new([0.0], [f64::INFINITY]).is_err());
+    }
+
+    #[test]
+    fn nan_holds_the_plays() {
+        let bank = PlayBank::new([0.0, 0.5], [1.0, 1.0]).unwrap();
+        let mut state = bank.rest();
+        let before = bank.step(&mut state, 2.0);
+        assert_eq!(bank.step(&mut state, f64::NAN), before);
+    }
+
+    #[test]
+    fn saved_state_continues() {
+        let bank = PlayBank::new([0.1_f32, 0.4], [1.0, 2.0]).unwrap();
+        let input = [0.3_f32, 1.0, 0.2, -0.7, 0.1];
+        let mut whole = [0.0; 5];
+        bank.block(&mut bank.rest(), &input, &mut whole);
+        let mut state = bank.rest();
+        let mut parts = [0.0; 5];
+        assert_eq!(bank.block(&mut state, &input[..2], &mut parts[..2]), 2);
+        let mut saved = [0.0; 2];
+        saved.copy_from_slice(state.plays());
+        let mut restored = bank.state_from(saved).unwrap();
+        bank.block(&mut restored, &input[2..], &mut parts[2..]);
+        assert_eq!(whole, parts);
+    }
+}

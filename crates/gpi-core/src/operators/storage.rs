@@ -1,0 +1,74 @@
+//! Number types and the arrays that hold parameters and states.
+
+use core::ops::{Add, Mul, Neg, Sub};
+
+/// A real number type that the operators run on: `f32` or `f64`.
+pub trait Sample:
+    Copy
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Neg<Output = Self>
+    + core::fmt::Debug
+{
+    /// The additive identity.
+    const ZERO: Self;
+    /// The multiplicative identity.
+    const ONE: Self;
+    /// Neither NaN nor infinite.
+    fn finite(self) -> bool;
+}
+
+macro_rules! impl_sample {
+    ($($number:ty),*) => {$(
+        impl Sample for $number {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            fn finite(self) -> bool {
+                self.is_finite()
+            }
+        }
+    )*};
+}
+
+impl_sample!(f32, f64);
+
+/// An array of samples: `[T; N]` on firmware (no heap), `Vec<T>` on a host.
+pub trait Storage: Clone {
+    /// The number type.
+    type Item: Sample;
+    /// The values.
+    fn values(&self) -> &[Self::Item];
+    /// The values, to be changed.
+    fn values_mut(&mut self) -> &mut [Self::Item];
+    /// An array of the same length in which every element is `value`.
+    fn filled(&self, value: Self::Item) -> Self;
+}
+
+impl<T: Sample, const N: usize> Storage for [T; N] {
+    type Item = T;
+    fn values(&self) -> &[T] {
+        self
+    }
+    fn values_mut(&mut self) -> &mut [T] {
+        self
+    }
+    fn filled(&self, value: T) -> Self {
+        [value; N]
+    }
+}
+
+#[cfg(feature = "identify")]
+impl<T: Sample> Storage for Vec<T> {
+    type Item = T;
+    fn values(&self) -> &[T] {
+        self
+    }
+    fn values_mut(&mut self) -> &mut [T] {
+        self
+    }
+    fn filled(&self, value: T) -> Self {
+        vec![value; self.len()]
+    }
+}

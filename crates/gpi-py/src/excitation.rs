@@ -1,0 +1,166 @@
+//! Excitation signals.
+
+use crate::arrays::from_vector;
+use crate::errors::to_python;
+use gpi_core::excitation::{self, Drive, Lines};
+use pyo3::prelude::*;
+
+/// A random-phase multisine, one period long, within `range`.
+///
+/// Parameters
+/// ----------
+/// samples : int
+///     Number of samples, the length of one period.
+/// rate : float
+///     Sampling rate in Hz.
+/// band : tuple of float
+///     Lowest and highest excited frequency in Hz.
+/// range : tuple of float
+///     Smallest and largest value, in the drive's unit.
+/// seed : int
+///     Seed of the phases.
+/// odd : bool
+///     Excite odd lines only, so that even nonlinearities show on the even lines.
+/// detection : bool
+///     Leave out one in four odd lines at random, so that odd nonlinearities show there.
+/// slew : float, optional
+///     Largest slope in units per second; where it clips, harmonics appear.
+///
+/// Returns
+/// -------
+/// ndarray, shape (samples,)
+///     The drive signal.
+///
+/// Raises
+/// ------
+/// ParameterError
+///     A parameter out of its range, a band without a line.
+///
+/// Examples
+/// --------
+/// >>> import gpi_hammerstein as gpi
+/// >>> u = gpi.multisine(2000, 1000.0, (0.5, 100.0), (0.0, 10.0), odd=True)
+/// >>> float(u.min()), float(u.max())
+/// (0.0, 10.0)
+#[pyfunction]
+#[pyo3(signature = (samples, rate, band, range, *, seed = 0, odd = false, detection = false, slew = None))]
+fn multisine(
+    py: Python<'_>,
+    samples: usize,
+    rate: f64,
+    band: (f64, f64),
+    range: (f64, f64),
+    seed: u64,
+    odd: bool,
+    detection: bool,
+    slew: Option<f64>,
+) -> PyResult<Bound<'_, PyAny>> {
+    let lines = match (odd, detection) {
+        (_, true) => Lines::OddWithDetection,
+        (true, false) => Lines::Odd,
+        (false, false) => Lines::All,
+    };
+    let drive = Drive { samples, rate, range, slew };
+    let signal = excitation::multisine(&drive, band, lines, seed).map_err(to_python)?;
+    Ok(from_vector(py, &signal))
+}
+
+/// A pseudo-random binary signal between the ends of `range`.
+///
+/// Parameters
+/// ----------
+/// samples : int
+///     Number of samples.
+/// rate : float
+///     Sampling rate in Hz.
+/// clock : float
+///     The signal may switch this often a second.
+/// range : tuple of float
+///     The two levels, in the drive's unit.
+/// seed : int
+///     Seed of the shift register.
+/// slew : float, optional
+///     Largest slope in units per second.
+///
+/// Returns
+/// -------
+/// ndarray, shape (samples,)
+///     The drive signal.
+///
+/// Raises
+/// ------
+/// ParameterError
+///     A parameter out of its range, a clock too slow to switch at all.
+///
+/// Examples
+/// --------
+/// >>> import gpi_hammerstein as gpi
+/// >>> u = gpi.prbs(1000, 1000.0, 100.0, (0.0, 5.0))
+/// >>> sorted(set(u.tolist()))
+/// [0.0, 5.0]
+#[pyfunction]
+#[pyo3(signature = (samples, rate, clock, range, *, seed = 0, slew = None))]
+fn prbs(
+    py: Python<'_>,
+    samples: usize,
+    rate: f64,
+    clock: f64,
+    range: (f64, f64),
+    seed: u64,
+    slew: Option<f64>,
+) -> PyResult<Bound<'_, PyAny>> {
+    let drive = Drive { samples, rate, range, slew };
+    Ok(from_vector(py, &excitation::prbs(&drive, clock, seed).map_err(to_python)?))
+}
+
+/// A triangle that starts in the middle of the range, reaches its ends, then decays to the middle.
+///
+/// Parameters
+/// ----------
+/// samples : int
+///     Number of samples.
+/// rate : float
+///     Sampling rate in Hz.
+/// frequency : float
+///     Periods a second.
+/// range : tuple of float
+///     Smallest and largest value, in the drive's unit.
+/// slew : float, optional
+///     Largest slope in units per second.
+///
+/// Returns
+/// -------
+/// ndarray, shape (samples,)
+///     The drive signal.
+///
+/// Raises
+/// ------
+/// ParameterError
+///     A parameter out of its range, less than one period.
+///
+/// Examples
+/// --------
+/// >>> import gpi_hammerstein as gpi
+/// >>> u = gpi.decaying_triangle(1000, 1000.0, 4.0, (0.0, 10.0))
+/// >>> float(u[0])
+/// 5.0
+#[pyfunction]
+#[pyo3(signature = (samples, rate, frequency, range, *, slew = None))]
+fn decaying_triangle(
+    py: Python<'_>,
+    samples: usize,
+    rate: f64,
+    frequency: f64,
+    range: (f64, f64),
+    slew: Option<f64>,
+) -> PyResult<Bound<'_, PyAny>> {
+    let drive = Drive { samples, rate, range, slew };
+    let signal = excitation::decaying_triangle(&drive, frequency).map_err(to_python)?;
+    Ok(from_vector(py, &signal))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(multisine, module)?)?;
+    module.add_function(wrap_pyfunction!(prbs, module)?)?;
+    module.add_function(wrap_pyfunction!(decaying_triangle, module)?)
+}

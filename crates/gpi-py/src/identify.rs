@@ -1,0 +1,309 @@
+//! From record to model.
+
+use crate::arrays::{from_vector, vector};
+use crate::errors::to_python;
+use crate::linear::Fir;
+use crate::model::Model;
+use crate::operators::Gpi;
+use crate::record::Record;
+use gpi_core::Error;
+use gpi_core::identify::{self as core, Grid, IdentifyOptions};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// A count, or values.
+fn grid(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Grid>> {
+    let Some(value) = value else { return Ok(None) };
+    if let Ok(count) = value.extract::<usize>() {
+        return Ok(Some(Grid::Count(count)));
+    }
+    Ok(Some(Grid::Values(vector(name, value)?)))
+}
+
+/// Runs long work without the interpreter's lock. Ctrl-C and exceptions of the progress function stop
+/// it and are raised.
+fn interruptible<T: Send>(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(core::Progress) -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    let mut raised = None;
+    let result = py.detach(|| {
+        let mut report = |stage: &str, done: f64| {
+            let outcome = Python::attach(|py| {
+                py.check_signals()?;
+                match &progress {
+                    Some(function) => function.call1(py, (stage, done)).map(|_| ()),
+                    None => Ok(()),
+                }
+            });
+            raised = outcome.err();
+            raised.is_none()
+        };
+        work(&mut report)
+    });
+    match raised {
+        Some(exception) => Err(exception),
+        None => result.map_err(to_python),
+    }
+}
+
+/// A hysteresis fitted to an input and an intermediate signal.
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct HysteresisFit {
+    fit: core::HysteresisFit,
+}
+
+#[pymethods]
+impl HysteresisFit {
+    /// Envelope and plays; the identity's weight in the envelope is 1.
+    #[getter]
+    fn gpi(&self) -> Gpi {
+        Gpi { hysteresis: self.fit.hysteresis.clone() }
+    }
+
+    /// Constant that v carries on top.
+    #[getter]
+    fn offset(&self) -> f64 {
+        self.fit.offset
+    }
+
+    /// F(-1) of the plays, in the order of their half-widths.
+    #[getter]
+    fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, &self.fit.start)
+    }
+
+    /// Root mean square error, in the unit of v.
+    #[getter]
+    fn rms(&self) -> f64 {
+        self.fit.rms
+    }
+
+    /// Root mean square error before every accepted step, then at the end.
+    #[getter]
+    fn history<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, &self.fit.history)
+    }
+
+    /// Whether the last step gained next to nothing; otherwise the step limit was reached.
+    #[getter]
+    fn converged(&self) -> bool {
+        self.fit.converged
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "HysteresisFit({} deadzones, {} plays, rms {:.4e}, converged: {})",
+            self.fit.hysteresis.envelope().weights().len(),
+            self.fit.hysteresis.plays().weights().len(),
+            self.fit.rms,
+            self.fit.converged
+        )
+    }
+}
+
+/// Fits envelope and plays, both at once, to an input and an intermediate signal.
+///
+/// ``v(k) = sum_i p_i F_{r_i}[D[u]](k) + offset`` with ``D[u] = u + sum_j g_j Z_{eta_j}[u]`` (one-sided
+/// deadzones) and p_i >= 0.
+///
+/// Parameters
+/// ----------
+/// u, v : array_like, shape (samples,)
+///     Input and intermediate signal.
+/// half_widths : int or array_like, optional
+///     How many to spread over half the span of u, or which ones, in the unit of u; 24 when left out.
+///     Zero is always among them.
+/// thresholds : int or array_like, optional
+///     How many to spread inside the range of u, or which ones; 10 when left out.
+/// progress : callable, optional
+///     Called with a stage's name and the fraction done; an exception stops the fit.
+///
+/// Returns
+/// -------
+/// HysteresisFit
+///     Operator, offset, start and error.
+///
+/// Raises
+/// ------
+/// DataError
+///     Unequal lengths, samples that are not finite, a constant signal, too few samples.
+/// ParameterError
+///     Half-widths that are negative, no half-width.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> import gpi_hammerstein as gpi
+/// >>> u = 4 * np.sin(0.01 * np.arange(2000)) * np.linspace(1, 0.5, 2000)
+/// >>> v = gpi.PlayBank([0.0, 1.0], [1.0, 0.5])(u)
+/// >>> fit = gpi.fit_hysteresis(u, v, half_widths=[0, 0.5, 1, 1.5], thresholds=0)
+/// >>> bool(fit.rms < 1e-6)
+/// True
+#[pyfunction]
+#[pyo3(signature = (u, v, *, half_widths = None, thresholds = None, progress = None))]
+fn fit_hysteresis(
+    py: Python<'_>,
+    u: &Bound<'_, PyAny>,
+    v: &Bound<'_, PyAny>,
+    half_widths: Option<&Bound<'_, PyAny>>,
+    thresholds: Option<&Bound<'_, PyAny>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<HysteresisFit> {
+    let (u, v) = (vector("u", u)?, vector("v", v)?);
+    let half_widths = grid("half_widths", half_widths)?.unwrap_or(Grid::Count(24));
+    let thresholds = grid("thresholds", thresholds)?.unwrap_or(Grid::Count(10));
+    let fit = interruptible(py, progress, |report| {
+        core::fit_hysteresis(&u, &v, &half_widths, &thresholds, report)
+    })?;
+    Ok(HysteresisFit { fit })
+}
+
+/// How a model was identified.
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct Identification {
+    found: core::Identification,
+}
+
+#[pymethods]
+impl Identification {
+    /// The paper's first stage, u to y; None where the input excites no more than gain and delay.
+    #[getter]
+    fn fir(&self) -> Option<Fir> {
+        self.found.fir.clone().map(|fir| Fir { fir })
+    }
+
+    /// Singular values of ERA's Hankel matrix in the best round, descending.
+    #[getter]
+    fn singular_values<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, &self.found.singular_values)
+    }
+
+    /// Unstable poles that were reflected into the unit circle.
+    #[getter]
+    fn reflected(&self) -> usize {
+        self.found.reflected
+    }
+
+    /// Taps that the input supports; None when there is no limit in sight.
+    #[getter]
+    fn supported_taps(&self) -> Option<usize> {
+        Some(self.found.supported_taps).filter(|&taps| taps < usize::MAX)
+    }
+
+    /// Delay in samples where the linear part is a gain with a delay, else None.
+    #[getter]
+    fn delay(&self) -> Option<usize> {
+        self.found.delay
+    }
+
+    /// What was left after each round: ``rms`` (training data, output's unit), ``order``, ``taps``.
+    #[getter]
+    fn rounds<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let row = |round: &core::Round| {
+            let row = PyDict::new(py);
+            row.set_item("rms", round.rms)?;
+            row.set_item("order", round.order)?;
+            row.set_item("taps", round.taps)?;
+            Ok(row)
+        };
+        self.found.rounds.iter().map(row).collect()
+    }
+
+    /// Samples at the start of each experiment that were not scored.
+    #[getter]
+    fn warmups(&self) -> Vec<usize> {
+        self.found.warmups.clone()
+    }
+
+    /// What the user should know, in sentences.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.found.notes.clone()
+    }
+
+    fn __repr__(&self) -> String {
+        let rms: Vec<String> =
+            self.found.rounds.iter().map(|round| format!("{:.4e}", round.rms)).collect();
+        format!("Identification(rms by round: {})", rms.join(", "))
+    }
+}
+
+/// Identifies a model from a record.
+///
+/// G comes from FIR least squares and ERA, the hysteresis from bounded least squares behind G, and
+/// both are repeated until nothing is gained. An input that excites few directions (a sine, say)
+/// supports a gain and a delay only; ``model.identification.notes`` says so.
+///
+/// Parameters
+/// ----------
+/// record : Record
+///     Training data; nothing else is looked at.
+/// taps : int, optional
+///     Taps of the FIR estimate; chosen from the slowest pole when left out.
+/// order : int, optional
+///     Order of G; chosen by an information criterion when left out.
+/// half_widths : int or array_like, optional
+///     How many plays to spread over half the span, or their half-widths; 24 when left out.
+/// thresholds : int or array_like, optional
+///     How many deadzones to spread inside the range, or their thresholds; 10 when left out.
+/// delay : int, optional
+///     Restricts G to a gain with a delay of this many samples.
+/// progress : callable, optional
+///     Called with a stage's name and the fraction done; an exception stops the work.
+///
+/// Returns
+/// -------
+/// Model
+///     With ``model.identification``.
+///
+/// Raises
+/// ------
+/// DataError
+///     Constant signals, more taps than the input excites or the samples allow.
+/// ParameterError
+///     A parameter out of its range.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> import gpi_hammerstein as gpi
+/// >>> u = gpi.multisine(4000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+/// >>> y = np.convolve(gpi.PlayBank([0, 2.0], [1.0, 0.5])(u), [0.0, 0.7, 0.3])[:4000]
+/// >>> record = gpi.Record(u, y, rate=1000.0)
+/// >>> model = gpi.identify(record, half_widths=[0, 1, 2, 3], thresholds=0)
+/// >>> model.error(record)["fit_percent"] > 98
+/// True
+#[pyfunction]
+#[pyo3(signature = (record, *, taps = None, order = None, half_widths = None, thresholds = None,
+    delay = None, progress = None))]
+fn identify(
+    py: Python<'_>,
+    record: &Record,
+    taps: Option<usize>,
+    order: Option<usize>,
+    half_widths: Option<&Bound<'_, PyAny>>,
+    thresholds: Option<&Bound<'_, PyAny>>,
+    delay: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Model> {
+    let options = IdentifyOptions {
+        taps,
+        order,
+        half_widths: grid("half_widths", half_widths)?,
+        thresholds: grid("thresholds", thresholds)?,
+        delay,
+    };
+    let record = &record.record;
+    let found = interruptible(py, progress, |report| core::identify(record, &options, report))?;
+    let model = found.model.clone();
+    Ok(Model { model, identification: Some(Py::new(py, Identification { found })?) })
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<HysteresisFit>()?;
+    module.add_class::<Identification>()?;
+    module.add_function(wrap_pyfunction!(fit_hysteresis, module)?)?;
+    module.add_function(wrap_pyfunction!(identify, module)?)
+}

@@ -1,0 +1,247 @@
+//! The identified model.
+
+use crate::arrays::{from_matrix, from_signal, from_vector, signal, vector};
+use crate::errors::{parameter, to_python};
+use crate::identify::Identification;
+use crate::linear::StateSpace;
+use crate::operators::{Gpi, read_state, write_state};
+use crate::record::{Record, names, units};
+use gpi_core::ModelState;
+use nalgebra::DVector;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// A Hammerstein model: ``y = G(q) P[D[u]] + offset``, one hysteresis per input.
+///
+/// It comes from ``identify``, ``load`` or ``Model.from_json``.
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct Model {
+    pub(crate) model: gpi_core::Model,
+    pub(crate) identification: Option<Py<Identification>>,
+}
+
+impl Model {
+    /// A state as one vector: previous input and plays of every input, then x.
+    fn write(state: &ModelState) -> Vec<f64> {
+        let plays = state.hysteresis.iter().flat_map(write_state);
+        plays.chain(state.linear.iter().copied()).collect()
+    }
+
+    fn read(&self, values: &[f64]) -> PyResult<ModelState> {
+        let sizes: Vec<usize> =
+            self.model.hysteresis().iter().map(|h| 1 + h.plays().weights().len()).collect();
+        let expected = sizes.iter().sum::<usize>() + self.model.linear().order();
+        if values.len() != expected {
+            let message =
+                format!("`state` has {} elements, but {expected} are needed", values.len());
+            return Err(parameter(message));
+        }
+        let mut rest = values;
+        let mut hysteresis = Vec::new();
+        for (operator, size) in self.model.hysteresis().iter().zip(sizes) {
+            let (own, others) = rest.split_at(size);
+            hysteresis.push(read_state(operator, own)?);
+            rest = others;
+        }
+        Ok(ModelState { hysteresis, linear: DVector::from_column_slice(rest) })
+    }
+}
+
+#[pymethods]
+impl Model {
+    /// Sampling rate in Hz.
+    #[getter]
+    fn rate(&self) -> f64 {
+        self.model.rate()
+    }
+
+    /// The hysteresis of each input.
+    #[getter]
+    fn hysteresis(&self) -> Vec<Gpi> {
+        self.model.hysteresis().iter().map(|h| Gpi { hysteresis: h.clone() }).collect()
+    }
+
+    /// The linear dynamics G, of unit DC gain where one input drives one output.
+    #[getter]
+    fn linear(&self) -> StateSpace {
+        self.model.linear().clone().into()
+    }
+
+    /// Constant term of each output, shape (outputs,), in its unit.
+    #[getter]
+    fn offsets<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, self.model.offsets())
+    }
+
+    /// Names of the inputs.
+    #[getter]
+    fn input_names(&self) -> Vec<String> {
+        names(self.model.inputs())
+    }
+
+    /// Names of the outputs.
+    #[getter]
+    fn output_names(&self) -> Vec<String> {
+        names(self.model.outputs())
+    }
+
+    /// Units of the inputs, empty where unknown.
+    #[getter]
+    fn input_units(&self) -> Vec<String> {
+        units(self.model.inputs())
+    }
+
+    /// Units of the outputs, empty where unknown.
+    #[getter]
+    fn output_units(&self) -> Vec<String> {
+        units(self.model.outputs())
+    }
+
+    /// How the model was identified; None for a model that was loaded.
+    #[getter]
+    fn identification(&self, py: Python<'_>) -> Option<Py<Identification>> {
+        self.identification.as_ref().map(|identification| identification.clone_ref(py))
+    }
+
+    /// The output for u, shape (samples,) or (samples, inputs).
+    ///
+    /// The actuator is taken to have been raised from zero to the first sample once, and to have stood
+    /// there before. Use ``start`` and ``run`` for another past.
+    fn simulate<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let (input, one_dimensional) = signal("u", u)?;
+        let output = self.model.simulate(&input).map_err(to_python)?;
+        Ok(from_signal(u.py(), &output, one_dimensional))
+    }
+
+    /// The intermediate signal v that belongs to ``simulate``, shaped like u.
+    fn intermediate<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let (input, one_dimensional) = signal("u", u)?;
+        let v = self.model.intermediate(&input).map_err(to_python)?;
+        Ok(from_signal(u.py(), &v, one_dimensional))
+    }
+
+    /// The state of an actuator that was raised from zero to u, shape (inputs,), and stands there.
+    fn start<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let state = self.model.start(&vector("u", u)?).map_err(to_python)?;
+        Ok(from_vector(u.py(), &Self::write(&state)))
+    }
+
+    /// The output from a given state, and the state after the last sample.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (samples,) or (samples, inputs)
+    ///     Input.
+    /// state : array_like
+    ///     What ``start`` or an earlier ``run`` returned.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray
+    ///     y, and the state.
+    fn run<'py>(
+        &self,
+        u: &Bound<'py, PyAny>,
+        state: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (input, one_dimensional) = signal("u", u)?;
+        let mut state = self.read(&vector("state", state)?)?;
+        let output = self.model.simulate_from(&mut state, &input).map_err(to_python)?;
+        let py = u.py();
+        Ok((from_signal(py, &output, one_dimensional), from_vector(py, &Self::write(&state))))
+    }
+
+    /// The simulation error over the scored samples of a record.
+    ///
+    /// Parameters
+    /// ----------
+    /// record : Record
+    ///     Measured input and output.
+    /// remove_mean : bool
+    ///     Take the mean of each experiment's residual out first, for a sensor whose offset moved.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     ``rms`` and ``max`` in the output's unit, ``nrmse`` (rms over span), ``fit_percent``
+    ///     (100 (1 - |e| / |y - mean y|)).
+    #[pyo3(signature = (record, *, remove_mean = false))]
+    fn error<'py>(
+        &self,
+        py: Python<'py>,
+        record: &Record,
+        remove_mean: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let error = self.model.error(&record.record, remove_mean).map_err(to_python)?;
+        let result = PyDict::new(py);
+        result.set_item("rms", error.rms)?;
+        result.set_item("nrmse", error.nrmse)?;
+        result.set_item("fit_percent", error.fit_percent)?;
+        result.set_item("max", error.max)?;
+        Ok(result)
+    }
+
+    /// Measured minus simulated output of each experiment, each of shape (samples, outputs).
+    fn residual<'py>(&self, py: Python<'py>, record: &Record) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let residuals = self.model.residuals(&record.record).map_err(to_python)?;
+        Ok(residuals.iter().map(|residual| from_matrix(py, residual)).collect())
+    }
+
+    /// The model as JSON (``gpi-model/1``).
+    fn to_json(&self) -> PyResult<String> {
+        self.model.to_json().map_err(to_python)
+    }
+
+    /// Reads what ``to_json`` wrote; raises DataError for another schema.
+    #[staticmethod]
+    fn from_json(text: &str) -> PyResult<Self> {
+        let model = gpi_core::Model::from_json(text).map_err(to_python)?;
+        Ok(Self { model, identification: None })
+    }
+
+    /// Writes the model to a JSON file; a file of that name is replaced as a whole.
+    fn save(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        let files = slf.py().import("gpi_hammerstein.files")?;
+        files.call_method1("save_model", (slf, path))?;
+        Ok(())
+    }
+
+    /// Draws measured and simulated output; see ``gpi_hammerstein.plot.fit``.
+    #[pyo3(signature = (record, ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        record: &Bound<'py, PyAny>,
+        ax: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let options = PyDict::new(slf.py());
+        options.set_item("ax", ax)?;
+        let module = slf.py().import("gpi_hammerstein.plot")?;
+        module.call_method("fit", (slf, record), Some(&options))
+    }
+
+    fn __repr__(&self) -> String {
+        let plays = |h: &gpi_core::Hysteresis| {
+            format!(
+                "{} deadzones, {} plays",
+                h.envelope().weights().len(),
+                h.plays().weights().len()
+            )
+        };
+        let hysteresis: Vec<String> = self.model.hysteresis().iter().map(plays).collect();
+        let label = |channels: &[gpi_core::Channel]| {
+            channels.iter().map(gpi_core::Channel::label).collect::<Vec<_>>().join(", ")
+        };
+        format!(
+            "Model({} -> {}, {}, linear order {}, {} Hz)",
+            label(self.model.inputs()),
+            label(self.model.outputs()),
+            hysteresis.join("; "),
+            self.model.linear().order(),
+            self.model.rate()
+        )
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Model>()
+}

@@ -1,0 +1,316 @@
+//! Deadzones, plays and their cascade.
+
+use crate::arrays::{from_vector, vector};
+use crate::errors::{parameter, to_python};
+use gpi_core::Hysteresis;
+use gpi_core::operators::{self, DeadzonesState, GpiState, Operator, Reading};
+use pyo3::prelude::*;
+
+type Bank = operators::PlayBank<Vec<f64>>;
+type Envelope = operators::Deadzones<Vec<f64>>;
+
+/// A weighted bank of plays: ``v(k) = sum_i p_i F_{r_i}[z](k)`` (equation 11 of the paper).
+///
+/// Each play follows (7), ``F(k) = max(z(k) - r, min(z(k) + r, F(k-1)))``, from rest F(-1) = 0.
+///
+/// Parameters
+/// ----------
+/// half_widths : array_like, shape (n,)
+///     r_i >= 0, half the width of the gap, in the input's unit.
+/// weights : array_like, shape (n,)
+///     p_i, of any sign, in output units per input unit.
+///
+/// Raises
+/// ------
+/// ParameterError
+///     Unequal lengths, values that are not finite, negative half-widths.
+///
+/// Examples
+/// --------
+/// >>> import gpi_hammerstein as gpi
+/// >>> bank = gpi.PlayBank([0.0, 0.5], [1.0, 1.0])
+/// >>> bank([2.0, 1.5]).tolist()
+/// [3.5, 3.0]
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct PlayBank {
+    pub(crate) bank: Bank,
+}
+
+#[pymethods]
+impl PlayBank {
+    #[new]
+    fn new(half_widths: &Bound<'_, PyAny>, weights: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (r, p) = (vector("half_widths", half_widths)?, vector("weights", weights)?);
+        Ok(Self { bank: Bank::new(r, p).map_err(to_python)? })
+    }
+
+    /// Half-widths r_i, shape (n,), in the input's unit.
+    #[getter]
+    fn half_widths<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, self.bank.half_widths())
+    }
+
+    /// Weights p_i, shape (n,).
+    #[getter]
+    fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, self.bank.weights())
+    }
+
+    /// The output of a signal z, shape (samples,), from rest.
+    fn __call__<'py>(&self, z: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(self.run(z, None)?.0)
+    }
+
+    /// The output from a given state, and the state after the last sample.
+    ///
+    /// Parameters
+    /// ----------
+    /// z : array_like, shape (samples,)
+    ///     Input.
+    /// state : array_like, shape (n,), optional
+    ///     Play outputs F_i(-1) in the input's unit; zeros (rest) when left out.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray
+    ///     v, shape (samples,), and the state, shape (n,).
+    #[pyo3(signature = (z, state = None))]
+    fn run<'py>(
+        &self,
+        z: &Bound<'py, PyAny>,
+        state: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let mut state = match state {
+            Some(plays) => self.bank.state_from(vector("state", plays)?).map_err(to_python)?,
+            None => self.bank.rest(),
+        };
+        let mut signal = vector("z", z)?;
+        self.bank.in_place(&mut state, &mut signal);
+        Ok((from_vector(z.py(), &signal), from_vector(z.py(), state.plays())))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("PlayBank({} plays, weights sum to {})", self.bank.weights().len(), sum(&self.bank))
+    }
+}
+
+fn sum(bank: &Bank) -> f64 {
+    bank.weights().iter().sum()
+}
+
+/// A weighted sum of deadzones: ``z(k) = sum_j g_j Z_{eta_j}[u](k)`` (equation 2 of the paper).
+///
+/// Parameters
+/// ----------
+/// thresholds : array_like, shape (m,)
+///     eta_j, in the input's unit, of either sign.
+/// weights : array_like, shape (m,)
+///     g_j, of either sign.
+/// reading : {"one-sided", "directional"}
+///     "one-sided" is the usual memoryless deadzone (eta > 0: max(u - eta, 0); eta < 0:
+///     min(u - eta, 0); eta = 0: u). "directional" is the paper's (3) exactly as printed, which also
+///     depends on whether u rises or falls.
+///
+/// Raises
+/// ------
+/// ParameterError
+///     Unequal lengths, values that are not finite, an unknown reading.
+///
+/// Examples
+/// --------
+/// >>> import gpi_hammerstein as gpi
+/// >>> envelope = gpi.Deadzones([0.0, 1.0], [1.0, -0.5])
+/// >>> envelope([-2.0, 0.5, 3.0]).tolist()
+/// [-2.0, 0.5, 2.0]
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct Deadzones {
+    pub(crate) envelope: Envelope,
+}
+
+fn reading_name(reading: Reading) -> &'static str {
+    match reading {
+        Reading::OneSided => "one-sided",
+        Reading::Directional => "directional",
+    }
+}
+
+#[pymethods]
+impl Deadzones {
+    #[new]
+    #[pyo3(signature = (thresholds, weights, reading = "one-sided"))]
+    fn new(
+        thresholds: &Bound<'_, PyAny>,
+        weights: &Bound<'_, PyAny>,
+        reading: &str,
+    ) -> PyResult<Self> {
+        let readings = [Reading::OneSided, Reading::Directional];
+        let Some(reading) = readings.into_iter().find(|&known| reading_name(known) == reading)
+        else {
+            let message = format!("`reading` = {reading}: must be one-sided or directional");
+            return Err(parameter(message));
+        };
+        let (eta, g) = (vector("thresholds", thresholds)?, vector("weights", weights)?);
+        Ok(Self { envelope: Envelope::new(eta, g, reading).map_err(to_python)? })
+    }
+
+    /// Thresholds eta_j, shape (m,), in the input's unit.
+    #[getter]
+    fn thresholds<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, self.envelope.thresholds())
+    }
+
+    /// Weights g_j, shape (m,).
+    #[getter]
+    fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, self.envelope.weights())
+    }
+
+    /// "one-sided" or "directional".
+    #[getter]
+    fn reading(&self) -> &'static str {
+        reading_name(self.envelope.reading())
+    }
+
+    /// The output of a signal u, shape (samples,), from rest (previous input zero).
+    fn __call__<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(self.run(u, None)?.0)
+    }
+
+    /// The output after a given previous input, and the last input.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (samples,)
+    ///     Input.
+    /// previous : float, optional
+    ///     u(-1), which only the directional reading looks at; zero when left out.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray and float
+    ///     z, shape (samples,), and the last input.
+    #[pyo3(signature = (u, previous = None))]
+    fn run<'py>(
+        &self,
+        u: &Bound<'py, PyAny>,
+        previous: Option<f64>,
+    ) -> PyResult<(Bound<'py, PyAny>, f64)> {
+        let mut state = DeadzonesState { previous: previous.unwrap_or(0.0) };
+        let mut signal = vector("u", u)?;
+        self.envelope.in_place(&mut state, &mut signal);
+        Ok((from_vector(u.py(), &signal), state.previous))
+    }
+
+    fn __repr__(&self) -> String {
+        let count = self.envelope.weights().len();
+        format!("Deadzones({count} thresholds, {})", self.reading())
+    }
+}
+
+/// The generalized Prandtl-Ishlinskii operator: ``v = P[D[u]]`` (equation 1 of the paper).
+///
+/// Parameters
+/// ----------
+/// envelope : Deadzones
+///     D.
+/// plays : PlayBank
+///     P.
+///
+/// Examples
+/// --------
+/// >>> import gpi_hammerstein as gpi
+/// >>> op = gpi.Gpi(gpi.Deadzones([0.0, 1.0], [1.0, -0.5]), gpi.PlayBank([0.0, 0.5], [1.0, 2.0]))
+/// >>> op([3.0]).tolist()
+/// [5.0]
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct Gpi {
+    pub(crate) hysteresis: Hysteresis,
+}
+
+#[pymethods]
+impl Gpi {
+    #[new]
+    fn new(envelope: &Deadzones, plays: &PlayBank) -> Self {
+        Self { hysteresis: operators::Gpi::new(envelope.envelope.clone(), plays.bank.clone()) }
+    }
+
+    /// The envelope D.
+    #[getter]
+    fn envelope(&self) -> Deadzones {
+        Deadzones { envelope: self.hysteresis.envelope().clone() }
+    }
+
+    /// The bank of plays P.
+    #[getter]
+    fn plays(&self) -> PlayBank {
+        PlayBank { bank: self.hysteresis.plays().clone() }
+    }
+
+    /// The output of a signal u, shape (samples,), from rest.
+    fn __call__<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(self.run(u, None)?.0)
+    }
+
+    /// The output from a given state, and the state after the last sample.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (samples,)
+    ///     Input.
+    /// state : array_like, shape (1 + n,), optional
+    ///     The previous input, then the play outputs; zeros (rest) when left out.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray
+    ///     v, shape (samples,), and the state, shape (1 + n,).
+    #[pyo3(signature = (u, state = None))]
+    fn run<'py>(
+        &self,
+        u: &Bound<'py, PyAny>,
+        state: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let mut state = match state {
+            Some(values) => read_state(&self.hysteresis, &vector("state", values)?)?,
+            None => self.hysteresis.rest(),
+        };
+        let mut signal = vector("u", u)?;
+        self.hysteresis.in_place(&mut state, &mut signal);
+        Ok((from_vector(u.py(), &signal), from_vector(u.py(), &write_state(&state))))
+    }
+
+    fn __repr__(&self) -> String {
+        let (m, n) =
+            (self.hysteresis.envelope().weights().len(), self.hysteresis.plays().weights().len());
+        format!("Gpi({m} deadzones, {n} plays)")
+    }
+}
+
+/// The state of a cascade from the previous input and the play outputs.
+pub(crate) fn read_state(
+    hysteresis: &Hysteresis,
+    values: &[f64],
+) -> PyResult<GpiState<f64, Vec<f64>>> {
+    let expected = 1 + hysteresis.plays().weights().len();
+    if values.len() != expected {
+        let message = format!(
+            "`state` has {} elements, but {expected} are needed: the previous input and the plays",
+            values.len()
+        );
+        return Err(parameter(message));
+    }
+    let plays = hysteresis.plays().state_from(values[1..].to_vec()).map_err(to_python)?;
+    Ok(GpiState { envelope: DeadzonesState { previous: values[0] }, plays })
+}
+
+/// The inverse of [`read_state`].
+pub(crate) fn write_state(state: &GpiState<f64, Vec<f64>>) -> Vec<f64> {
+    let previous = std::iter::once(state.envelope.previous);
+    previous.chain(state.plays.plays().iter().copied()).collect()
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PlayBank>()?;
+    module.add_class::<Deadzones>()?;
+    module.add_class::<Gpi>()
+}

@@ -1,0 +1,270 @@
+//! Measured records.
+
+use crate::arrays::{experiments, from_matrix, vector};
+use crate::errors::{parameter, to_python};
+use gpi_core::{Channel, Experiment, Matrix, TimeAxis};
+use pyo3::prelude::*;
+
+/// Experiments of one actuator at one sampling rate.
+///
+/// Parameters
+/// ----------
+/// u, y : array_like, shape (samples,) or (samples, channels), or a list of arrays
+///     Input and output; a list of arrays holds one array an experiment.
+/// rate : float
+///     Sampling rate in Hz.
+/// covariates : like u, optional
+///     Other measured columns.
+/// warmup : int or list of int, optional
+///     Samples at the start of each experiment that drive the model but are not scored; none when left
+///     out.
+/// input_names, output_names, covariate_names : list of str, optional
+///     Names of the columns; u, y, x, numbered when there are several.
+/// input_units, output_units, covariate_units : list of str, optional
+///     Units, as labels.
+///
+/// Raises
+/// ------
+/// DataError
+///     Samples that are NaN or infinite (column and row are named), unequal lengths, no samples.
+/// ParameterError
+///     A rate that is not positive, arrays of another shape.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> import gpi_hammerstein as gpi
+/// >>> u = np.sin(np.arange(100.0))
+/// >>> gpi.Record(u, 2 * u, rate=1000.0, input_units=["V"], output_units=["um"])
+/// Record(100 samples at 1000 Hz, u [V] -> y [um])
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct Record {
+    pub(crate) record: gpi_core::Record,
+}
+
+fn channels(
+    letter: &str,
+    count: usize,
+    names: Option<Vec<String>>,
+    units: Option<Vec<String>>,
+) -> PyResult<Vec<Channel>> {
+    let default = |index: usize| {
+        if count == 1 { letter.to_owned() } else { format!("{letter}{}", index + 1) }
+    };
+    let names = names.unwrap_or_else(|| (0..count).map(default).collect());
+    let units = units.unwrap_or_else(|| vec![String::new(); count]);
+    for (what, length) in [("names", names.len()), ("units", units.len())] {
+        if length != count {
+            let message = format!("{length} {what} for `{letter}`, but it has {count} columns");
+            return Err(parameter(message));
+        }
+    }
+    Ok(names.into_iter().zip(units).map(|(name, unit)| Channel::new(name, unit)).collect())
+}
+
+#[derive(FromPyObject)]
+enum Warmup {
+    Same(usize),
+    Each(Vec<usize>),
+}
+
+#[pymethods]
+impl Record {
+    #[new]
+    #[pyo3(signature = (u, y, rate, *, covariates = None, warmup = None,
+        input_names = None, output_names = None, covariate_names = None,
+        input_units = None, output_units = None, covariate_units = None))]
+    fn new(
+        u: &Bound<'_, PyAny>,
+        y: &Bound<'_, PyAny>,
+        rate: f64,
+        covariates: Option<&Bound<'_, PyAny>>,
+        warmup: Option<Warmup>,
+        input_names: Option<Vec<String>>,
+        output_names: Option<Vec<String>>,
+        covariate_names: Option<Vec<String>>,
+        input_units: Option<Vec<String>>,
+        output_units: Option<Vec<String>>,
+        covariate_units: Option<Vec<String>>,
+    ) -> PyResult<Self> {
+        let (u, y) = (experiments("u", u)?, experiments("y", y)?);
+        let x = match covariates {
+            Some(x) => experiments("covariates", x)?,
+            None => u.iter().map(|u| Matrix::zeros(u.nrows(), 0)).collect(),
+        };
+        let warmups = match warmup.unwrap_or(Warmup::Same(0)) {
+            Warmup::Same(count) => vec![count; u.len()],
+            Warmup::Each(counts) => counts,
+        };
+        let lengths = [("y", y.len()), ("covariates", x.len()), ("warmup", warmups.len())];
+        for (name, length) in lengths {
+            if length != u.len() {
+                let message = format!("`u` has {} experiments, but `{name}` {length}", u.len());
+                return Err(parameter(message));
+            }
+        }
+        let width = |signals: &[Matrix]| signals.first().map_or(0, Matrix::ncols);
+        let inputs = channels("u", width(&u), input_names, input_units)?;
+        let outputs = channels("y", width(&y), output_names, output_units)?;
+        let others = channels("x", width(&x), covariate_names, covariate_units)?;
+        let experiments = u
+            .into_iter()
+            .zip(y)
+            .zip(x)
+            .zip(warmups)
+            .map(|(((input, output), covariates), warmup)| Experiment {
+                input,
+                output,
+                covariates,
+                warmup,
+            })
+            .collect();
+        let record = gpi_core::Record::new(experiments, rate, inputs, outputs, others);
+        Ok(Self { record: record.map_err(to_python)? })
+    }
+
+    /// Input of each experiment, each of shape (samples, inputs).
+    #[getter]
+    fn u<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
+        self.record.experiments().iter().map(|e| from_matrix(py, &e.input)).collect()
+    }
+
+    /// Output of each experiment, each of shape (samples, outputs).
+    #[getter]
+    fn y<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
+        self.record.experiments().iter().map(|e| from_matrix(py, &e.output)).collect()
+    }
+
+    /// Other measured columns of each experiment, each of shape (samples, covariates).
+    #[getter]
+    fn covariates<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
+        self.record.experiments().iter().map(|e| from_matrix(py, &e.covariates)).collect()
+    }
+
+    /// Samples at the start of each experiment that are not scored.
+    #[getter]
+    fn warmup(&self) -> Vec<usize> {
+        self.record.experiments().iter().map(|e| e.warmup).collect()
+    }
+
+    /// Sampling rate in Hz.
+    #[getter]
+    fn rate(&self) -> f64 {
+        self.record.rate()
+    }
+
+    /// Samples of all experiments together.
+    #[getter]
+    fn samples(&self) -> usize {
+        self.record.samples()
+    }
+
+    /// Names of the inputs.
+    #[getter]
+    fn input_names(&self) -> Vec<String> {
+        names(self.record.inputs())
+    }
+
+    /// Names of the outputs.
+    #[getter]
+    fn output_names(&self) -> Vec<String> {
+        names(self.record.outputs())
+    }
+
+    /// Names of the other measured columns.
+    #[getter]
+    fn covariate_names(&self) -> Vec<String> {
+        names(self.record.covariates())
+    }
+
+    /// Units of the inputs, empty where unknown.
+    #[getter]
+    fn input_units(&self) -> Vec<String> {
+        units(self.record.inputs())
+    }
+
+    /// Units of the outputs, empty where unknown.
+    #[getter]
+    fn output_units(&self) -> Vec<String> {
+        units(self.record.outputs())
+    }
+
+    /// Units of the other measured columns, empty where unknown.
+    #[getter]
+    fn covariate_units(&self) -> Vec<String> {
+        units(self.record.covariates())
+    }
+
+    /// Splits every experiment in time.
+    ///
+    /// Parameters
+    /// ----------
+    /// fraction : float
+    ///     Share of the scored samples that goes into the first record, between 0 and 1.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of Record
+    ///     The first part, and the rest. The rest keeps the first part as its warm-up: it is simulated
+    ///     with its true past and scored only after it.
+    fn split(&self, fraction: f64) -> PyResult<(Self, Self)> {
+        let (first, rest) = self.record.split(fraction).map_err(to_python)?;
+        Ok((Self { record: first }, Self { record: rest }))
+    }
+
+    fn __repr__(&self) -> String {
+        let labels = |channels: &[Channel]| {
+            channels.iter().map(Channel::label).collect::<Vec<_>>().join(", ")
+        };
+        let count = self.record.experiments().len();
+        let experiments = if count == 1 { String::new() } else { format!("{count} experiments, ") };
+        format!(
+            "Record({experiments}{} samples at {} Hz, {} -> {})",
+            self.record.samples(),
+            self.record.rate(),
+            labels(self.record.inputs()),
+            labels(self.record.outputs())
+        )
+    }
+}
+
+pub(crate) fn names(channels: &[Channel]) -> Vec<String> {
+    channels.iter().map(|channel| channel.name.clone()).collect()
+}
+
+pub(crate) fn units(channels: &[Channel]) -> Vec<String> {
+    channels.iter().map(|channel| channel.unit.clone()).collect()
+}
+
+/// Reads the sampling rate from time stamps.
+///
+/// Parameters
+/// ----------
+/// stamps : array_like, shape (samples,)
+///     Time in seconds.
+///
+/// Returns
+/// -------
+/// tuple of float
+///     The rate in Hz, and the largest deviation of a step from the median step as a fraction of it.
+///
+/// Raises
+/// ------
+/// DataError
+///     Stamps that do not increase, gaps, sampling that is not uniform; the row is named.
+///
+/// Examples
+/// --------
+/// >>> import gpi_hammerstein as gpi
+/// >>> gpi.time_axis([0.0, 0.5, 1.0])
+/// (2.0, 0.0)
+#[pyfunction]
+fn time_axis(stamps: &Bound<'_, PyAny>) -> PyResult<(f64, f64)> {
+    let axis = TimeAxis::read(&vector("stamps", stamps)?).map_err(to_python)?;
+    Ok((axis.rate, axis.jitter))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Record>()?;
+    module.add_function(wrap_pyfunction!(time_axis, module)?)
+}

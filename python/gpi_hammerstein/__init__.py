@@ -1,0 +1,89 @@
+"""Identify piezo and other smart-material actuators from measured data.
+
+The model, in the order the signal flows::
+
+    u -> z = sum_j g_j Z_eta_j[u] -> v = sum_i p_i F_r_i[z] -> y = G(q) v + offset
+         deadzones (envelope)        plays (hysteresis)       linear dynamics
+
+u is (samples, inputs), y is (samples, outputs); only these two are measured.
+
+>>> import gpi_hammerstein as gpi  # doctest: +SKIP
+>>> record = gpi.read_record("run.csv")  # doctest: +SKIP
+>>> model = gpi.identify(record)  # doctest: +SKIP
+>>> y = model.simulate(record.u[0])  # doctest: +SKIP
+
+`gpi_hammerstein.plot` draws stages and results; it is loaded when it is first used.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from gpi_hammerstein._native import (
+    DataError,
+    Deadzones,
+    Fir,
+    Gpi,
+    GpiError,
+    HysteresisFit,
+    Identification,
+    IntermediateSignal,
+    Model,
+    NoncausalFir,
+    NumericalError,
+    ParameterError,
+    PlayBank,
+    Record,
+    StateSpace,
+    __version__,
+    decaying_triangle,
+    era,
+    fir,
+    fit_hysteresis,
+    identify,
+    multisine,
+    prbs,
+)
+from gpi_hammerstein.files import load_model as load
+from gpi_hammerstein.files import save_model as save
+from gpi_hammerstein.io import read_record
+
+if TYPE_CHECKING:
+    from gpi_hammerstein import plot
+
+__all__ = [
+    "DataError",
+    "Deadzones",
+    "Fir",
+    "Gpi",
+    "GpiError",
+    "HysteresisFit",
+    "Identification",
+    "IntermediateSignal",
+    "Model",
+    "NoncausalFir",
+    "NumericalError",
+    "ParameterError",
+    "PlayBank",
+    "Record",
+    "StateSpace",
+    "__version__",
+    "decaying_triangle",
+    "era",
+    "fir",
+    "fit_hysteresis",
+    "identify",
+    "load",
+    "multisine",
+    "plot",
+    "prbs",
+    "read_record",
+    "save",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load `plot`, and with it Matplotlib, when it is first used."""
+    if name == "plot":
+        import importlib
+
+        return importlib.import_module("gpi_hammerstein.plot")
+    raise AttributeError(f"module `gpi_hammerstein` has no attribute `{name}`")

@@ -1,0 +1,101 @@
+"""The command `gpi`."""
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from gpi_hammerstein._native import DataError, ParameterError, __version__
+from gpi_hammerstein.cli.demo import demo
+from gpi_hammerstein.cli.excite import excite
+from gpi_hammerstein.cli.identify import identify
+from gpi_hammerstein.cli.output import complain
+from gpi_hammerstein.cli.reproduce import reproduce
+from gpi_hammerstein.cli.simulate import simulate
+from gpi_hammerstein.cli.validate import validate
+
+DONE, FAILED, WRONG_CALL, UNUSABLE_DATA, INTERRUPTED = 0, 1, 2, 3, 130
+
+app = typer.Typer(
+    name="gpi",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    help="Identify piezo and other smart-material actuators from measured data.",
+    epilog="Exit codes: 0 done, 2 the call is wrong, 3 the data are unusable, 1 anything else.",
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"gpi {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+for command in (demo, identify, simulate, validate):
+    app.command()(command)
+app.add_typer(excite, name="excite")
+app.add_typer(reproduce, name="reproduce")
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code.
+
+    Parameters
+    ----------
+    arguments
+        The words after ``gpi``; None takes those of the process.
+
+    Returns
+    -------
+    int
+        0 done, 2 the call is wrong, 3 the data are unusable, 1 anything else, 130 interrupted.
+
+    Examples
+    --------
+    >>> run(["simulate", "no-such-model.json", "no-such-record.csv"])  # doctest: +SKIP
+    3
+    """
+    try:
+        code = app(args=None if arguments is None else list(arguments), standalone_mode=False)
+        return code if isinstance(code, int) else DONE
+    except ParameterError as error:
+        return complain(error, WRONG_CALL)
+    except DataError as error:
+        return complain(error, UNUSABLE_DATA)
+    except (KeyboardInterrupt, typer.Abort):
+        return complain("interrupted; nothing was written", INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of a pipe has gone: let the interpreter's last flush go nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except Exception as error:
+        if os.environ.get("GPI_DEBUG"):
+            raise
+        # Typer carries its own copy of Click's exceptions: they are known by what they can do.
+        if callable(show := getattr(error, "show", None)):
+            show()
+            return int(getattr(error, "exit_code", WRONG_CALL))
+        return complain(error, FAILED)
+    except BaseException as error:
+        # A panic of the native module is a BaseException; it has printed where it happened.
+        if type(error).__name__ != "PanicException":
+            raise
+        return complain(f"a bug in the native module: {error}", FAILED)
+
+
+def main() -> None:
+    """Run the command and leave with its exit code."""
+    sys.exit(run())

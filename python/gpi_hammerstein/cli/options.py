@@ -1,0 +1,137 @@
+"""Options that several commands share, and how their text is read."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gpi_hammerstein._native import ParameterError
+from gpi_hammerstein.io import Recording, read_recording
+
+COLUMNS = "Columns"
+
+Records = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="RECORD",
+        help="Files of one actuator: .csv, .csv.gz, .parquet, .npz, .npy (see --output) or .mat.",
+        show_default=False,
+    ),
+]
+Input = Annotated[
+    list[str] | None,
+    typer.Option("--input", "-u", help="Input columns; `u`, `u1` are found.", rich_help_panel=COLUMNS),
+]
+Output = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--output",
+        "-y",
+        help="Output columns; `y`, `y1`, `output` are found. For a .npy record: the .npy file of the output.",
+        rich_help_panel=COLUMNS,
+    ),
+]
+Time = Annotated[
+    str | None,
+    typer.Option("--time", help="Time column; `t` and `time` are found.", rich_help_panel=COLUMNS),
+]
+Rate = Annotated[
+    float | None,
+    typer.Option("--rate", help="Sampling rate in Hz, instead of a time column.", rich_help_panel=COLUMNS),
+]
+Covariate = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--covariate",
+        help="Other measured columns; all other columns unless named. `none` leaves them out.",
+        rich_help_panel=COLUMNS,
+    ),
+]
+Resample = Annotated[
+    str | None,
+    typer.Option(
+        "--resample",
+        metavar="RATE|auto",
+        help="Make the sampling uniform: interpolate linearly to RATE in Hz (`auto`: the usual step) and cut "
+        "the record at gaps and where the clock jumps back.",
+        rich_help_panel=COLUMNS,
+    ),
+]
+Warmup = Annotated[
+    int | None,
+    typer.Option("--warmup", min=0, help="Samples at the start of every experiment that are not scored."),
+]
+Experiments = Annotated[
+    str | None,
+    typer.Option("--experiments", metavar="0-4,7", help="Experiments to use, counted from 0."),
+]
+RemoveMean = Annotated[
+    bool,
+    typer.Option("--remove-mean", help="Leave a constant offset (a sensor's zero) out of the error."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="DIR", help="Folder for what is written.", show_default=False),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
+
+
+def read(
+    files: list[Path],
+    *,
+    input: list[str] | None,
+    output: list[str] | None,
+    time: str | None,
+    rate: float | None,
+    covariate: list[str] | None,
+    resample: str | None,
+    warmup: int | None,
+    experiments: str | None = None,
+) -> Recording:
+    """Read a record as the options say."""
+    return read_recording(
+        list(files),
+        input=split_names(input),
+        output=split_names(output),
+        time=time,
+        rate=rate,
+        covariate=[] if covariate == ["none"] else split_names(covariate),
+        warmup=warmup,
+        resample=parse_resample(resample),
+        experiment=experiments,
+    )
+
+
+def split_names(names: list[str] | None) -> list[str] | None:
+    """Split names that are joined by commas."""
+    if not names:
+        return None
+    return [part.strip() for name in names for part in name.split(",") if part.strip()]
+
+
+def parse_resample(text: str | None) -> bool | float | None:
+    """Read ``auto`` or a rate in Hz."""
+    if text is None:
+        return None
+    if text.strip().lower() == "auto":
+        return True
+    try:
+        return float(text)
+    except ValueError:
+        raise ParameterError(f"`resample` = {text}: write a rate in Hz, or `auto`") from None
+
+
+def parse_numbers(name: str, text: str | None) -> int | list[float] | None:
+    """Read a count (one whole number) or a list of numbers joined by commas."""
+    if text is None:
+        return None
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    try:
+        if len(parts) == 1 and parts[0].isdecimal():
+            return int(parts[0])
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        numbers = []
+    if not numbers:
+        raise ParameterError(f"`{name}` = {text}: write how many there shall be, or numbers joined by commas")
+    return numbers

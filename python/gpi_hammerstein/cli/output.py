@@ -1,0 +1,149 @@
+"""What a command prints and writes."""
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress
+from rich.table import Table
+
+from gpi_hammerstein._native import GpiError, Record
+from gpi_hammerstein.io import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Figures = Mapping[str, float] | None
+
+
+def complain(problem: Exception | str, code: int) -> int:
+    """Print one line about what went wrong to stderr and return the exit code."""
+    if isinstance(problem, Exception) and not isinstance(problem, GpiError):
+        text = f"{type(problem).__name__}: {problem} (GPI_DEBUG=1 shows where)"
+    else:
+        text = str(problem)
+    print(f"gpi: {text}", file=sys.stderr)
+    return code
+
+
+def plain(value: Any) -> Any:
+    """Turn arrays into lists and numbers that are not finite into None, for JSON."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [plain(item) for item in value]
+    if isinstance(value, complex):
+        return [plain(value.real), plain(value.imag)]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def print_json(result: Mapping[str, Any]) -> None:
+    """Print one JSON object on stdout."""
+    print(json.dumps(plain(result), allow_nan=False))
+
+
+def write_json(result: Mapping[str, Any], path: Path) -> None:
+    """Write one JSON object to a file, for people to read as well."""
+    path.write_text(json.dumps(plain(result), allow_nan=False, indent=2) + "\n")
+
+
+def console() -> Console:
+    """Return the console that summaries are printed on."""
+    screen = Console(highlight=False, soft_wrap=True)
+    if not screen.is_terminal:
+        # A file or a pipe has no width that numbers would have to be cut to.
+        screen.width = 120
+    return screen
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Show on stderr, if it is a terminal, that something is going on."""
+    errors = Console(stderr=True)
+    with errors.status(what) if errors.is_terminal else nullcontext():
+        yield
+
+
+@contextmanager
+def progress_bar() -> Iterator[Callable[[str, float], None] | None]:
+    """Yield a function that draws a bar on stderr, None if that is no terminal."""
+    errors = Console(stderr=True)
+    if not errors.is_terminal:
+        yield None
+        return
+    with Progress(console=errors, transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def report(stage: str, done: float) -> None:
+            bar.update(task, description=stage, completed=done)
+
+        yield report
+
+
+def describe_record(recording: Recording, files: Sequence[Path | str]) -> dict[str, Any]:
+    """Return the part of a result that says what was read."""
+    return {
+        "files": [str(file) for file in files],
+        "samples": sum(len(run.u) for run in recording.runs),
+        "experiments": len(recording.runs),
+        "rate_hz": recording.rate,
+        "inputs": [column.header for column in recording.inputs],
+        "outputs": [column.header for column in recording.outputs],
+        "covariates": [column.header for column in recording.covariates],
+        "notes": recording.notes,
+    }
+
+
+def error_table(rows: Mapping[str, Figures], unit: str = "", title: str = "Simulation error") -> Table:
+    """Return a table of error figures, one row a data set."""
+    table = Table(title=title, title_justify="left")
+    table.add_column("")
+    label = f" [{unit}]" if unit else ""
+    for name in (f"rms{label}", "rms / span", "fit", f"largest{label}"):
+        table.add_column(escape(name), justify="right")
+    for name, figures in rows.items():
+        if figures is None:
+            table.add_row(name, *["-"] * 4)
+            continue
+        table.add_row(
+            name,
+            f"{figures['rms']:.4g}",
+            f"{100 * figures['nrmse']:.3g} %",
+            f"{figures['fit_percent']:.2f} %",
+            f"{figures['max']:.4g}",
+        )
+    return table
+
+
+def common_unit(record: Record) -> str:
+    """Return the unit of the outputs when they share one."""
+    units = set(record.output_units)
+    return units.pop() if len(units) == 1 else ""
+
+
+def picture(path: Path, draw: Callable[["Axes"], object], width: float = 8.0, height: float = 4.5) -> None:
+    """Draw one PNG; no state of pyplot is touched."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=120, layout="constrained")
+    draw(figure.add_subplot())
+    figure.savefig(path)
+
+
+def say_written(screen: Console, out: Path | None, files: Sequence[str]) -> None:
+    """Print which files were written."""
+    if out is not None:
+        screen.print(f"Written to {escape(str(out))}: {', '.join(files)}")

@@ -1,0 +1,132 @@
+"""`gpi simulate`: run a model on a record's input."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import polars as pl
+import typer
+
+from gpi_hammerstein import files
+from gpi_hammerstein._native import DataError, Model
+from gpi_hammerstein.cli import options
+from gpi_hammerstein.cli.output import (
+    common_unit,
+    console,
+    describe_record,
+    error_table,
+    print_json,
+    say_written,
+    working,
+)
+from gpi_hammerstein.io import Recording
+
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="A model.json.", show_default=False)]
+Skip = Annotated[float, typer.Option(help="Seconds at the start that are not scored.", metavar="SECONDS")]
+
+
+def simulate(
+    model_file: ModelFile,
+    records: options.Records,
+    input: options.Input = None,
+    output: options.Output = None,
+    time: options.Time = None,
+    rate: options.Rate = None,
+    covariate: options.Covariate = None,
+    resample: options.Resample = None,
+    warmup: options.Warmup = None,
+    experiments: options.Experiments = None,
+    skip: Skip = 0.0,
+    remove_mean: options.RemoveMean = False,
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> None:
+    """Simulate a model from a record's input alone, and compare with its output when it has one.
+
+    Writes simulated.csv (t, y or y1, y2, ..; with a leading column `experiment` when there are several)
+    to DIR.
+    """
+    model = files.load_model(model_file)
+    recording = options.read(
+        records,
+        input=input,
+        output=output,
+        time=time,
+        rate=rate,
+        covariate=covariate,
+        resample=resample,
+        warmup=warmup,
+        experiments=experiments,
+    ).skip(skip)
+    require_match(model, recording)
+    record = recording.record() if recording.outputs else None
+    with working("simulating"):
+        error = None if record is None else model.error(record, remove_mean=remove_mean)
+        simulated = simulated_table(model, recording) if out is not None else None
+    result = {
+        "schema": "gpi-simulation/1",
+        "model": str(model_file),
+        "record": describe_record(recording, records),
+        "mean_removed": remove_mean,
+        "skipped_s": skip,
+        "error": error,
+        "files": [],
+    }
+    if out is not None and simulated is not None:
+        with files.staged(out) as folder:
+            simulated.write_csv(folder / "simulated.csv", float_precision=None)
+        result["files"] = ["simulated.csv"]
+    if as_json:
+        print_json(result)
+        return
+    screen = console()
+    for note in recording.notes:
+        screen.print(f"[yellow]note[/] {note}", markup=True)
+    if record is None:
+        screen.print("The record has no output column: nothing to compare with.")
+    else:
+        mean = ", mean removed" if remove_mean else ""
+        screen.print(error_table({"record": error}, common_unit(record), f"Simulation error{mean}"))
+    say_written(screen, out, ["simulated.csv"])
+
+
+def require_match(model: Model, recording: Recording) -> None:
+    """Refuse a record that the model was not made for."""
+    for what, ours, theirs in (
+        ("inputs", len(model.input_names), len(recording.inputs)),
+        ("outputs", len(model.output_names), len(recording.outputs) or len(model.output_names)),
+    ):
+        if ours != theirs:
+            raise DataError(
+                f"the model has {ours} {what}, but the record has {theirs}; "
+                "name the columns (--input, --output)"
+            )
+    if abs(model.rate - recording.rate) > 1e-3 * model.rate:
+        raise DataError(
+            f"the model is sampled at {model.rate:g} Hz, but the record at {recording.rate:g} Hz; "
+            f"resample it (--resample {model.rate:g})"
+        )
+    units = [*zip(model.input_units, recording.inputs, strict=True)]
+    if recording.outputs:
+        units += zip(model.output_units, recording.outputs, strict=True)
+    for unit, column in units:
+        if unit and column.unit and unit != column.unit:
+            raise DataError(
+                f"column `{column.header}` is in {column.unit}, but the model was fitted in {unit}; "
+                "convert it"
+            )
+
+
+def simulated_table(model: Model, recording: Recording) -> pl.DataFrame:
+    """Return time and simulated outputs of all experiments."""
+    several = len(model.output_names) > 1
+    names = [f"y{index + 1}" for index in range(len(model.output_names))] if several else ["y"]
+    frames = []
+    for number, run in enumerate(recording.runs):
+        y = np.asarray(model.simulate(run.u)).reshape(len(run.u), -1)
+        t = run.start + np.arange(len(run.u)) / recording.rate
+        columns = {"t": t, **{name: y[:, index] for index, name in enumerate(names)}}
+        if len(recording.runs) > 1:
+            columns = {"experiment": np.full(len(run.u), number), **columns}
+        frames.append(pl.DataFrame(columns))
+    return pl.concat(frames)

@@ -1,0 +1,170 @@
+"""What a column's header says: name, unit, and the part it plays."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from gpi_hammerstein._native import DataError
+
+# Seconds in one unit of a time column.
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+
+UNITS = frozenset(
+    [*TIME_UNITS, *"V mV uV kV A mA uA kA C nC pC W mW m mm um nm pm cm km N mN uN kN Nm".split()]
+    + "Pa kPa MPa bar mbar psi g kg deg rad mrad urad nrad arcsec K degC degF Hz kHz MHz T mT Oe".split()
+    + "Ohm kOhm F nF pF percent rpm".split()
+)
+
+TIME = re.compile(r"t|time|timestamp", re.IGNORECASE)
+INPUT = re.compile(r"(u|in|input)_?\d*", re.IGNORECASE)
+OUTPUT = re.compile(r"(y|out|output)_?\d*", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column's header and what it says."""
+
+    header: str
+    name: str
+    unit: str
+    array: str
+    """Name of the array that the column was cut from; the header itself in a table."""
+
+    def matches(self, wanted: str) -> bool:
+        """Whether a user who writes `wanted` means this column."""
+        return wanted in (self.header, self.name, self.array)
+
+
+@dataclass(frozen=True)
+class Roles:
+    """The columns of a file, sorted by the part they play."""
+
+    time: Column | None = None
+    inputs: list[Column] = field(default_factory=list)
+    outputs: list[Column] = field(default_factory=list)
+    covariates: list[Column] = field(default_factory=list)
+
+    def used(self) -> list[Column]:
+        """All columns that play a part."""
+        time = [self.time] if self.time else []
+        return [*time, *self.inputs, *self.outputs, *self.covariates]
+
+
+def parse_header(header: str, array: str | None = None) -> Column:
+    """Split a header into name and unit.
+
+    Parameters
+    ----------
+    header
+        Such as ``y_um``, ``y [um]`` or ``y``. What follows the last underscore is the unit only if
+        it is the symbol of one.
+    array
+        Name of the array that the column was cut from.
+
+    Returns
+    -------
+    Column
+        Name and unit; the unit is empty when the header has none.
+
+    Examples
+    --------
+    >>> parse_header("y_um").unit, parse_header("x_left").name
+    ('um', 'x_left')
+    """
+    header = header.strip()
+    name, unit = header, ""
+    if found := re.fullmatch(r"(.*?)\s*[\[(](.*)[\])]", header):
+        name, unit = found[1], found[2].strip()
+    else:
+        *rest, last = header.split("_")
+        if last in UNITS and any(rest):
+            name, unit = "_".join(rest), last
+            *rest, before = rest
+            if last in TIME_UNITS and before in UNITS and any(rest):
+                name, unit = "_".join(rest), f"{before}/{last}"
+    return Column(header, name, unit, array or header)
+
+
+def assign_roles(
+    columns: Sequence[Column],
+    *,
+    source: str,
+    time: str | None = None,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    covariates: Sequence[str] | None = None,
+    need_time: bool = True,
+) -> Roles:
+    """Find which column is time, which are inputs, outputs and covariates.
+
+    Parameters
+    ----------
+    columns
+        The columns of a file.
+    source
+        The file, for messages.
+    time, inputs, outputs, covariates
+        Names given by the user, with or without unit. What is None is found by its usual name:
+        ``t`` or ``time``; ``u``, ``u1``, ``input``; ``y``, ``y1``, ``output``; every other column is
+        a covariate.
+    need_time
+        False when the rate is known: a time column is then found but not needed.
+
+    Returns
+    -------
+    Roles
+        No output at all is allowed: such a record can be simulated.
+
+    Raises
+    ------
+    DataError
+        A named column does not exist, no input is found, or one column has two parts.
+
+    Examples
+    --------
+    >>> roles = assign_roles([parse_header(h) for h in ("t_s", "u_V", "y_um")], source="demo")
+    >>> roles.outputs[0].name
+    'y'
+    """
+
+    def named(option: str, names: Sequence[str]) -> list[Column]:
+        found: list[Column] = []
+        for name in names:
+            matching = [column for column in columns if column.matches(name)]
+            if not matching:
+                there = ", ".join(column.header for column in columns)
+                raise DataError(f"{source}: no column `{name}` (asked for as {option}); there are: {there}")
+            found += matching
+        return found
+
+    def usual(pattern: re.Pattern[str], taken: Sequence[Column]) -> list[Column]:
+        return [c for c in columns if pattern.fullmatch(c.name) and c not in taken]
+
+    time_given = named("time", [time]) if time is not None else []
+    given = [*time_given]
+    chosen_inputs = named("input", inputs) if inputs is not None else None
+    chosen_outputs = named("output", outputs) if outputs is not None else None
+    chosen_covariates = named("covariate", covariates) if covariates is not None else None
+    for chosen in (chosen_inputs, chosen_outputs, chosen_covariates):
+        given += chosen or []
+    twice = sorted({column.header for column in given if given.count(column) > 1})
+    if twice:
+        raise DataError(f"{source}: column `{twice[0]}` is given two parts; name it once")
+
+    times = time_given or usual(TIME, given)[:1]
+    if chosen_inputs is None:
+        chosen_inputs = usual(INPUT, [*given, *times])
+    if chosen_outputs is None:
+        chosen_outputs = usual(OUTPUT, [*given, *times])
+    if not chosen_inputs:
+        there = ", ".join(column.header for column in columns)
+        raise DataError(f"{source}: no input column; name one with input= (--input). There are: {there}")
+    if not times and need_time:
+        raise DataError(
+            f"{source}: no time column; name one with time= (--time) or give the sampling rate in Hz "
+            "with rate= (--rate)"
+        )
+    taken = [*given, *times, *chosen_inputs, *chosen_outputs]
+    if chosen_covariates is None:
+        chosen_covariates = [column for column in columns if column not in taken]
+    return Roles(times[0] if times else None, chosen_inputs, chosen_outputs, chosen_covariates)

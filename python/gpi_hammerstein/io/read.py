@@ -1,0 +1,267 @@
+"""Records from files."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from gpi_hammerstein._native import DataError, ParameterError, Record
+from gpi_hammerstein.io.arrays import read_mat, read_npy_pair, read_npz
+from gpi_hammerstein.io.clock import resample as put_on_grid
+from gpi_hammerstein.io.clock import uniform_rate
+from gpi_hammerstein.io.columns import TIME_UNITS, Column, Roles, assign_roles
+from gpi_hammerstein.io.recording import Recording, Run
+from gpi_hammerstein.io.tables import Table, read_csv, read_parquet
+
+PathLike = str | os.PathLike[str]
+Names = str | Sequence[str]
+
+
+def read_record(
+    path: PathLike | Sequence[PathLike],
+    *,
+    input: Names | None = None,
+    output: Names | None = None,
+    time: str | None = None,
+    rate: float | None = None,
+    covariate: Names | None = None,
+    warmup: int | None = None,
+    resample: bool | float | None = None,
+    experiment: str | int | Sequence[int] | None = None,
+) -> Record:
+    """Read a record of one or several experiments.
+
+    Parameters
+    ----------
+    path
+        A file, or a list of files with the same columns, whose experiments are put in one record:
+        CSV (``.csv``, ``.csv.gz``, also semicolon or tab separated), Parquet (``.parquet``), NumPy
+        (``.npz``, ``.npy``), MATLAB v5 or v7.3 (``.mat``). Arrays in the last two are (samples,),
+        (samples, channels), (samples, channels, realisations) or (samples, channels, realisations,
+        periods): every realisation is an experiment whose periods but the last are warm-up.
+    input, output, covariate
+        Names of the columns with or without their unit: ``"u_V"`` or ``"u"``. What is not given is
+        found: inputs ``u``, ``u1``, ``input``; outputs ``y``, ``y1``, ``output``; every other column is a
+        covariate (``covariate=[]`` leaves them out). For a ``.npy`` file, which holds the input alone,
+        `output` is the path of the file that holds the output.
+    time
+        Name of the time column; ``t`` and ``time`` are found. The unit after its last underscore is
+        heeded (``t_ms``), s when there is none.
+    rate
+        Sampling rate in Hz; takes the place of the time column.
+    warmup
+        Samples at the start of every experiment that drive the model but are not scored; None is 0, or
+        what the periods of an array say.
+    resample
+        True, or a rate in Hz: makes non-uniform sampling uniform by linear interpolation, and cuts the
+        record into several experiments at gaps and where the clock jumps back.
+    experiment
+        Experiments to keep, counted from 0: ``3``, ``[0, 2]``, ``"0-4,7"``.
+
+    Returns
+    -------
+    Record
+        u, y, covariates, rate, names and units.
+
+    Raises
+    ------
+    ParameterError
+        An option contradicts the file or is out of range.
+    DataError
+        The file is missing, empty or holds text, NaN or infinite samples; columns are missing or of
+        unequal length; time stamps have gaps, run backwards or are not uniform. The message names the
+        column and the rows, which count from 0.
+
+    Examples
+    --------
+    >>> record = gpi.read_record("run.csv", input="u_V", output="y_um")  # doctest: +SKIP
+    >>> record.rate, record.output_units  # doctest: +SKIP
+    (200.0, ['um'])
+    """
+    recording = read_recording(
+        path,
+        input=input,
+        output=output,
+        time=time,
+        rate=rate,
+        covariate=covariate,
+        warmup=warmup,
+        resample=resample,
+        experiment=experiment,
+    )
+    return recording.record()
+
+
+def read_recording(
+    path: PathLike | Sequence[PathLike],
+    *,
+    input: Names | None = None,
+    output: Names | None = None,
+    time: str | None = None,
+    rate: float | None = None,
+    covariate: Names | None = None,
+    warmup: int | None = None,
+    resample: bool | float | None = None,
+    experiment: str | int | Sequence[int] | None = None,
+) -> Recording:
+    """Read like :func:`read_record`, but without asking for an output column.
+
+    Parameters
+    ----------
+    path, input, output, time, rate, covariate, warmup, resample, experiment
+        As in :func:`read_record`.
+
+    Returns
+    -------
+    Recording
+        The experiments, and notes of what was done to the samples.
+
+    Raises
+    ------
+    ParameterError, DataError
+        As in :func:`read_record`.
+
+    Examples
+    --------
+    >>> read_recording("input_only.csv").runs[0].u.shape  # doctest: +SKIP
+    (1000, 1)
+    """
+    if rate is not None and not rate > 0:
+        raise ParameterError(f"`rate` = {rate}: the sampling rate in Hz must be positive")
+    if rate is not None and resample:
+        raise ParameterError("`rate` and `resample` exclude each other: resampling needs the time stamps")
+    if warmup is not None and warmup < 0:
+        raise ParameterError(f"`warmup` = {warmup}: must be zero or a number of samples")
+    paths = [Path(path)] if isinstance(path, str | os.PathLike) else [Path(one) for one in path]
+    if not paths:
+        raise ParameterError("`path`: no file is named; name at least one record")
+    if len(paths) > 1 and any(one.suffix == ".npy" for one in paths):
+        raise ParameterError(
+            f"`path`: {len(paths)} files are named, but a .npy record is 1 input and 1 output; use .npz"
+        )
+    parts = []
+    for one in paths:
+        outputs = _names(output)
+        if one.suffix == ".npy":
+            tables, outputs = _read_npy(one, outputs), None
+        else:
+            tables = _read_tables(one)
+        for table in tables:
+            roles = assign_roles(
+                table.headers(),
+                source=table.source,
+                time=time,
+                inputs=_names(input),
+                outputs=outputs,
+                covariates=_names(covariate),
+                need_time=rate is None and table.rate is None,
+            )
+            parts.append(_read_part(table, roles, rate, resample, warmup))
+    return _join(parts, [str(one) for one in paths]).select(experiment)
+
+
+def _names(names: Names | None) -> list[str] | None:
+    return None if names is None else [names] if isinstance(names, str) else list(names)
+
+
+def _read_tables(path: Path) -> list[Table]:
+    suffixes = [suffix.lower() for suffix in path.suffixes]
+    if not path.exists():
+        raise DataError(f"{path}: no such file; name a record")
+    if suffixes[-1:] == [".parquet"]:
+        return [read_parquet(path)]
+    if suffixes[-1:] == [".npz"]:
+        return read_npz(path)
+    if suffixes[-1:] == [".mat"]:
+        return read_mat(path)
+    if suffixes[-1:] in ([".csv"], [".tsv"], [".txt"], [".dat"]) or suffixes[-1:] == [".gz"]:
+        return [read_csv(path)]
+    raise DataError(
+        f"{path}: the name says no known format; records end in .csv, .csv.gz, .parquet, .npz, .npy or .mat"
+    )
+
+
+def _read_npy(path: Path, outputs: list[str] | None) -> list[Table]:
+    if not path.exists():
+        raise DataError(f"{path}: no such file; name a record")
+    if outputs is None:
+        return read_npy_pair(path, None)
+    if len(outputs) > 1:
+        raise ParameterError(
+            f"`output` names {len(outputs)} files, but {path} needs 1: the .npy file of the output"
+        )
+    output = Path(outputs[0])
+    # A bare file name means the folder of the input when there is no such file here.
+    if not output.exists() and (path.parent / output).exists():
+        output = path.parent / output
+    if not output.exists():
+        raise DataError(f"{output}: no such file; for a .npy record, `output` is the .npy file of the output")
+    return read_npy_pair(path, output)
+
+
+def _read_part(
+    table: Table, roles: Roles, rate: float | None, resample: bool | float | None, warmup: int | None
+) -> Recording:
+    """Cut one table into experiments."""
+    signals = [*roles.inputs, *roles.outputs, *roles.covariates]
+    table.require_numbers(signals)
+    samples = table.stack(signals)
+    pieces, notes, starts = [samples], [], [0.0]
+    given = rate or table.rate
+    if roles.time is not None and rate is None:
+        table.require_numbers([roles.time])
+        stamps = table.columns[roles.time] * TIME_UNITS.get(roles.time.unit, 1.0)
+        if resample:
+            asked = None if resample is True else float(resample)
+            found = put_on_grid(stamps, samples, asked, table.source)
+            pieces, given, notes = found.pieces, found.rate, [found.note]
+            starts = [0.0] * len(pieces)
+        else:
+            given, starts = uniform_rate(stamps, table.source), [float(stamps[0])]
+    elif resample:
+        raise ParameterError(
+            f"`resample`: {table.source} has no time stamps to resample by; give the rate (--rate)"
+        )
+    assert given is not None  # assign_roles asks for a time column otherwise
+    inputs, outputs = len(roles.inputs), len(roles.outputs)
+    start_of_covariates = inputs + outputs
+    runs = [
+        Run(
+            piece[:, :inputs],
+            piece[:, inputs:start_of_covariates],
+            piece[:, start_of_covariates:],
+            table.warmup if warmup is None else warmup,
+            start,
+        )
+        for piece, start in zip(pieces, starts, strict=True)
+    ]
+    return Recording(runs, given, roles.inputs, roles.outputs, roles.covariates, notes)
+
+
+def _join(parts: Sequence[Recording], sources: Sequence[str]) -> Recording:
+    """Put all experiments in one recording."""
+    first, *others = parts
+    runs, notes = list(first.runs), list(first.notes)
+    where = f"{sources[0]} and {sources[-1]}" if len(sources) > 1 else sources[0]
+    for part in others:
+        if abs(part.rate - first.rate) > 1e-3 * first.rate:
+            raise DataError(
+                f"{where}: sampled at {first.rate:g} and {part.rate:g} Hz; resample to one rate (--resample)"
+            )
+        for what, ours, theirs in (
+            ("inputs", first.inputs, part.inputs),
+            ("outputs", first.outputs, part.outputs),
+            ("covariates", first.covariates, part.covariates),
+        ):
+            if _labels(ours) != _labels(theirs):
+                raise DataError(
+                    f"{where}: {what} differ: {', '.join(_labels(ours)) or 'none'} and "
+                    f"{', '.join(_labels(theirs)) or 'none'}; name the columns that both have"
+                )
+        runs += part.runs
+        notes += part.notes
+    return replace(first, runs=runs, notes=notes)
+
+
+def _labels(columns: Sequence[Column]) -> list[str]:
+    return [column.header for column in columns]

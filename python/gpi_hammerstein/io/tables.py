@@ -1,0 +1,203 @@
+"""Columns of numbers from CSV and Parquet files."""
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from gpi_hammerstein._native import DataError
+from gpi_hammerstein.io.columns import Column, parse_header
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of equal length, the samples of one experiment."""
+
+    source: str
+    columns: dict[Column, Array]
+    text: dict[Column, tuple[int, str]]
+    """Columns that hold text: the first such row and what stands there."""
+    rate: float | None = None
+    """The sampling rate in Hz, when the file states it."""
+    warmup: int = 0
+    """Samples at the start that are a run-in."""
+
+    def headers(self) -> list[Column]:
+        """All columns."""
+        return [*self.columns, *self.text]
+
+    def require_numbers(self, columns: Sequence[Column]) -> None:
+        """Refuse text, NaN and infinite samples in `columns`.
+
+        Raises
+        ------
+        DataError
+            Names the column and the rows, which count from 0.
+        """
+        for column in columns:
+            if column in self.text:
+                row, cell = self.text[column]
+                raise DataError(
+                    f"{self.source}: column `{column.header}` holds text, first `{cell}` in row {row}; "
+                    "repair it, or leave it out by naming the covariates (covariate=[], --covariate none)"
+                )
+            rows = np.flatnonzero(~np.isfinite(self.columns[column]))
+            if rows.size:
+                shown = ", ".join(map(str, rows[:5])) + (", .." if rows.size > 5 else "")
+                raise DataError(
+                    f"{self.source}: column `{column.header}` has {rows.size} NaN, infinite or empty "
+                    f"samples, in rows {shown}; repair or cut out these rows"
+                )
+
+    def stack(self, columns: Sequence[Column]) -> Array:
+        """Columns side by side, (samples, columns)."""
+        rows = len(next(iter(self.columns.values())))
+        return np.column_stack([np.empty((rows, 0)), *(self.columns[column] for column in columns)])
+
+
+def read_csv(path: Path) -> Table:
+    """Read a CSV file, gzipped or not.
+
+    Parameters
+    ----------
+    path
+        Comma, semicolon or tab separated, with one header line; lines that start with ``#`` are
+        left out.
+
+    Returns
+    -------
+    Table
+        Empty cells are NaN.
+
+    Raises
+    ------
+    DataError
+        The file is empty, has no header, or its rows have more cells than its header.
+
+    Examples
+    --------
+    >>> read_csv(Path("record.csv")).headers()  # doctest: +SKIP
+    """
+    try:
+        data = path.read_bytes()
+        if data[:2] == b"\x1f\x8b":
+            import gzip
+
+            data = gzip.decompress(data)
+        text = data.decode("utf-8-sig")
+    except (OSError, EOFError) as error:
+        raise DataError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: not a text file; a CSV record is UTF-8 text") from error
+    header = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+    if not header:
+        raise DataError(f"{path}: the file is empty; a record has a header line and one row a sample")
+    separator = max(",;\t", key=header.count)
+    cells = [cell.strip().strip('"') for cell in header.split(separator)]
+    if all(_is_number(cell) for cell in cells):
+        raise DataError(
+            f"{path}: no header line (row 0 reads `{header[:60]}`); add one such as `t_s,u_V,y_um`"
+        )
+    repeated = sorted({cell for cell in cells if cells.count(cell) > 1})
+    if repeated:
+        raise DataError(f"{path}: {cells.count(repeated[0])} columns are named `{repeated[0]}`; rename them")
+    try:
+        frame = pl.read_csv(
+            io.BytesIO(text.encode()), separator=separator, comment_prefix="#", infer_schema=False
+        )
+    except pl.exceptions.PolarsError as error:
+        raise DataError(f"{path}: cannot be read as CSV: {str(error).splitlines()[0]}") from error
+    return from_frame(frame, str(path))
+
+
+def read_parquet(path: Path) -> Table:
+    """Read a Parquet file.
+
+    Parameters
+    ----------
+    path
+        Columns of numbers with names such as ``t_s``, ``u_V``, ``y_um``.
+
+    Returns
+    -------
+    Table
+        Nulls are NaN.
+
+    Raises
+    ------
+    DataError
+        The file is empty or no Parquet file.
+
+    Examples
+    --------
+    >>> read_parquet(Path("record.parquet")).headers()  # doctest: +SKIP
+    """
+    try:
+        frame = pl.read_parquet(io.BytesIO(path.read_bytes()))
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+    except pl.exceptions.PolarsError as error:
+        raise DataError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from error
+    return from_frame(frame, str(path))
+
+
+def from_frame(frame: pl.DataFrame, source: str) -> Table:
+    """Turn a data frame into a table; cells that are no numbers make their column a text column.
+
+    Parameters
+    ----------
+    frame
+        Columns of numbers or of text that reads as numbers.
+    source
+        The file, for messages.
+
+    Returns
+    -------
+    Table
+        The numbers as float64.
+
+    Raises
+    ------
+    DataError
+        The frame has no rows.
+
+    Examples
+    --------
+    >>> from_frame(pl.DataFrame({"u_V": ["1", "x"]}), "demo").text
+    {Column(header='u_V', name='u', unit='V', array='u_V'): (1, 'x')}
+    """
+    if frame.height == 0:
+        raise DataError(f"{source}: the file is empty: a header without rows; a record has one row a sample")
+    columns: dict[Column, Array] = {}
+    text: dict[Column, tuple[int, str]] = {}
+    for series in frame:
+        column = parse_header(series.name)
+        if series.dtype == pl.String:
+            cells = series.str.strip_chars()
+            cells = cells.set(cells == "", None)
+            numbers = cells.cast(pl.Float64, strict=False)
+            wrong = (numbers.is_null() & cells.is_not_null()).arg_true()
+            if len(wrong):
+                text[column] = (int(wrong[0]), str(cells[int(wrong[0])]))
+                continue
+        elif series.dtype.is_numeric() or series.dtype == pl.Boolean:
+            numbers = series.cast(pl.Float64)
+        else:
+            text[column] = (0, str(series[0]))
+            continue
+        columns[column] = numbers.fill_null(float("nan")).to_numpy().astype(np.float64)
+    return Table(source, columns, text)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

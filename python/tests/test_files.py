@@ -1,0 +1,62 @@
+"""Files are written whole or not at all; models survive them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gpi_hammerstein as gpi
+from gpi_hammerstein.files import staged, write_atomically
+from records import RATE, actuator, drive
+
+
+def test_a_model_survives_its_file(tmp_path: Path) -> None:
+    u = drive()
+    model = gpi.identify(gpi.Record(u, actuator(u), RATE))
+    path = tmp_path / "model.json"
+    gpi.save(model, path)
+    np.testing.assert_array_equal(gpi.load(path).simulate(u), model.simulate(u))
+    model.save(path)
+    assert gpi.load(path).to_json() == model.to_json()
+    assert [file.name for file in tmp_path.iterdir()] == ["model.json"]
+
+
+def test_unknown_models_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "model.json"
+    path.write_text('{"schema": "gpi-model/2"}')
+    with pytest.raises(gpi.DataError, match="gpi-model/2"):
+        gpi.load(path)
+    with pytest.raises(gpi.DataError, match="cannot be read"):
+        gpi.load(tmp_path / "none.json")
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(gpi.DataError, match="not a model file"):
+        gpi.load(path)
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "note.txt"
+    write_atomically(path, "old")
+
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", fail)
+    with pytest.raises(gpi.ParameterError, match="No space left"):
+        write_atomically(path, "new")
+    assert path.read_text() == "old"
+    assert [file.name for file in tmp_path.iterdir()] == ["note.txt"]
+
+
+def test_staged_files_appear_together(tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "out"
+    with staged(out) as folder:
+        (folder / "a").write_text("a")
+        assert not out.exists()
+    assert (out / "a").read_text() == "a"
+    with pytest.raises(RuntimeError), staged(out) as folder:
+        (folder / "b").write_text("b")
+        raise RuntimeError
+    assert [file.name for file in out.iterdir()] == ["a"]
+    with pytest.raises(RuntimeError), staged(tmp_path / "never") as folder:
+        raise RuntimeError
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["deep"]
