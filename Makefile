@@ -17,7 +17,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # The order of `make test` is part of what it promises, also under `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench figures clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -64,6 +64,9 @@ test-python: $(NATIVE) ## pytest
 
 bench: ## Run the benchmarks
 	cargo bench
+
+figures: $(NATIVE) ## Print the figures of README; needs the measured data
+	$(BIN)/python tools/measured_figures.py
 
 clean: ## Remove the environment, all builds and all caches
 	cargo clean

@@ -120,8 +120,10 @@ pub fn identify(
 /// What all rounds start from.
 struct Start<'a> {
     given: &'a Record,
-    /// The record without the samples that the plays' unknown past disturbs.
+    /// The record without the samples that the plays' unknown past disturbs, and without the mean
+    /// of each output.
     record: Record,
+    means: Vec<f64>,
     unknown_past: bool,
     half_widths: Grid,
     point: Point,
@@ -168,6 +170,14 @@ impl<'a> Start<'a> {
                 }
             }
         }
+        // An offset far larger than what moves would cost digits.
+        let columns = given.experiments()[0].output.column_iter();
+        let means: Vec<f64> = columns.map(|column| column.mean()).collect();
+        for experiment in &mut experiments {
+            for (mut column, mean) in experiment.output.column_iter_mut().zip(&means) {
+                column.add_scalar_mut(-mean);
+            }
+        }
         let starts = experiments
             .iter()
             .map(|e| {
@@ -180,7 +190,7 @@ impl<'a> Start<'a> {
             .collect();
         let record = given.with_experiments(experiments)?;
         let point = Point { channels, starts };
-        Ok(Self { given, record, unknown_past, half_widths, point, notes })
+        Ok(Self { given, record, means, unknown_past, half_widths, point, notes })
     }
 
     /// The linear part is a gain of plus or minus one with the delay that fits best.
@@ -191,6 +201,12 @@ impl<'a> Start<'a> {
         progress: Progress,
     ) -> Result<Identification, Error> {
         const LONGEST_DELAY: usize = 7;
+        /// As many states: a longer delay is better cut out of the record.
+        const LONGEST_GIVEN: usize = 500;
+        if let Some(delay) = delay.filter(|&delay| delay > LONGEST_GIVEN) {
+            let requirement = format!("at most {LONGEST_GIVEN} samples; shift the output instead");
+            return Err(Error::parameter("delay", delay, requirement));
+        }
         let gain = linear::estimate(&self.record, 1, 0.0)?.markov.remove(0);
         let delays = delay.map_or(0..=LONGEST_DELAY, |delay| delay..=delay);
         let derivatives = Derivatives { thresholds: false, starts: self.unknown_past };
@@ -354,7 +370,8 @@ impl<'a> Start<'a> {
             |e: &Experiment| (e.input.nrows() - e.warmup) as f64 / self.record.scored() as f64;
         let offset = |output: usize| {
             let parts = experiments.iter().enumerate();
-            parts.map(|(index, e)| weight(e) * offsets[(index, output)]).sum()
+            let rest: f64 = parts.map(|(index, e)| weight(e) * offsets[(index, output)]).sum();
+            self.means[output] + rest
         };
         let offsets = (0..outputs.len()).map(offset).collect();
         let rate = self.given.rate();

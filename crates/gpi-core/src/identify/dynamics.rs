@@ -37,6 +37,8 @@ pub(super) fn estimate(
     const SMALL: std::ops::RangeInclusive<usize> = 1..=6;
     /// A flat tail of singular values that suggests more than this is noise.
     const LARGEST: usize = 60;
+    /// A large order has to lower the error of the small ones to this fraction.
+    const WORTH: f64 = 0.8;
     let fir = linear::estimate(record, taps, ridge)?;
     check()?;
     let hankel = Hankel::new(&fir.markov, None)?;
@@ -66,7 +68,10 @@ pub(super) fn estimate(
         };
         let refit = refit(record, era.system)?;
         singular_values = era.singular_values;
-        if best.as_ref().is_none_or(|best| better(era.reflected, &refit, best)) {
+        // Many states can follow any misfit a little; they must be worth it.
+        let worth =
+            |(_, best): &(usize, Refit)| order <= *SMALL.end() || refit.rms < WORTH * best.rms;
+        if best.as_ref().is_none_or(|best| worth(best) && better(era.reflected, &refit, best)) {
             best = Some((era.reflected, refit));
         }
     }

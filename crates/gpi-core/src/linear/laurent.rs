@@ -1,6 +1,7 @@
 //! The noncausal FIR inverse: running stable dynamics backwards, whatever their zeros.
 
 use super::StateSpace;
+use super::decompose::solve;
 use crate::{Error, Matrix};
 use num_complex::Complex64;
 use std::ops::Range;
@@ -95,39 +96,59 @@ impl StateSpace {
         Ok(truncate(&series, options))
     }
 
-    /// Laurent coefficients of G^-1 for lags 0, 1, .., then negative ones from the end.
+    /// Laurent coefficients of G^-1 for lags 0, 1, .., then negative ones from the end; `size` is a
+    /// power of two.
     fn laurent_series(&self, size: usize) -> Result<Vec<Matrix>, Error> {
         let channels = self.inputs();
-        let step = std::f64::consts::TAU / size as f64;
-        let frequencies: Vec<f64> = (0..=size / 2).map(|line| step * line as f64).collect();
-        let response = self.frequency_response(&frequencies);
-        let mut inverse = Vec::with_capacity(response.len());
-        for (matrix, &frequency) in response.into_iter().zip(&frequencies) {
-            let Some(inverted) = matrix.try_inverse() else {
+        let mut planner = rustfft::FftPlanner::new();
+        let forward = planner.plan_fft_forward(size);
+        let mut response = vec![nalgebra::DMatrix::<Complex64>::zeros(channels, channels); size];
+        let folded = self.folded_response(size)?;
+        for (row, column) in (0..channels).flat_map(|i| (0..channels).map(move |j| (i, j))) {
+            let mut buffer: Vec<Complex64> =
+                folded.iter().map(|tap| Complex64::new(tap[(row, column)], 0.0)).collect();
+            forward.process(&mut buffer);
+            for (matrix, value) in response.iter_mut().zip(buffer) {
+                matrix[(row, column)] = value;
+            }
+        }
+        for (line, matrix) in response.iter_mut().enumerate() {
+            if !matrix.try_inverse_mut() {
+                let frequency = std::f64::consts::TAU * line as f64 / size as f64;
                 let tolerance = ZERO_TOLERANCE;
                 return Err(Error::ZeroOnUnitCircle { distance: 0.0, frequency, tolerance });
-            };
-            inverse.push(inverted);
+            }
         }
-        let transform = rustfft::FftPlanner::new().plan_fft_inverse(size);
+        let backward = planner.plan_fft_inverse(size);
         let mut series = vec![Matrix::zeros(channels, channels); size];
-        for row in 0..channels {
-            for column in 0..channels {
-                let value = |line: usize| {
-                    if line <= size / 2 {
-                        inverse[line][(row, column)]
-                    } else {
-                        inverse[size - line][(row, column)].conj()
-                    }
-                };
-                let mut buffer: Vec<Complex64> = (0..size).map(value).collect();
-                transform.process(&mut buffer);
-                for (tap, value) in series.iter_mut().zip(&buffer) {
-                    tap[(row, column)] = value.re / size as f64;
-                }
+        for (row, column) in (0..channels).flat_map(|i| (0..channels).map(move |j| (i, j))) {
+            let mut buffer: Vec<Complex64> = response.iter().map(|m| m[(row, column)]).collect();
+            backward.process(&mut buffer);
+            for (tap, value) in series.iter_mut().zip(&buffer) {
+                tap[(row, column)] = value.re / size as f64;
             }
         }
         Ok(series)
+    }
+
+    /// The impulse response folded to one period, `sum_m H_{k + m size}`: its discrete Fourier
+    /// transform is G on the grid exactly, however slowly the response decays.
+    fn folded_response(&self, size: usize) -> Result<Vec<Matrix>, Error> {
+        let mut power = self.a().clone();
+        for _ in 0..size.trailing_zeros() {
+            power = &power * &power;
+        }
+        let identity = Matrix::identity(self.order(), self.order());
+        let remedy = "only stable dynamics are run backwards";
+        let singular = Error::Unstable { modulus: 1.0, remedy };
+        let mut state = solve(identity - power, self.b()).ok_or(singular)?;
+        let mut folded = vec![Matrix::zeros(self.outputs(), self.inputs()); size];
+        for k in 1..=size {
+            folded[k % size] += self.c() * &state;
+            state = self.a() * state;
+        }
+        folded[0] += self.d();
+        Ok(folded)
     }
 }
 
