@@ -282,10 +282,16 @@ def residual(
     values = model.residual(record)[experiment][:, output]
     ax.plot(np.arange(len(values)) / record.rate, values, color=BLUE, lw=0.8)
     _shade_warmup(ax, record, experiment)
-    largest = float(np.abs(values[record.warmup[experiment] :]).max())
-    if largest > 0:
-        # The start-up of a run-in may leave the picture.
-        ax.set_ylim(-1.15 * largest, 1.15 * largest)
+    scored = np.abs(values[record.warmup[experiment] :])
+    usual, largest = (float(value) for value in np.quantile(scored, [0.99, 1.0]))
+    # An unknown start or a few outliers may leave the picture, but it says so.
+    limit = largest if largest < 5 * usual else 2 * usual
+    if limit > 0:
+        ax.set_ylim(-1.15 * limit, 1.15 * limit)
+    beyond = int(np.sum(scored > 1.15 * limit))
+    if beyond:
+        text = f"{beyond} samples beyond, up to {largest:.3g}"
+        ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize="small")
     ax.axhline(0.0, color=BLACK, lw=0.5)
     ax.set_xlabel("time [s]")
     ax.set_ylabel(label(f"residual of {record.output_names[output]}", record.output_units[output]))

@@ -33,8 +33,8 @@ DEADZONE_WEIGHTS = (
 
 ERRATA = (
     "The paper's printing errors: (49) is (48) held and sampled every 1e-2 s, not every 1e-5 s as the "
-    "text says; at 1e-5 s the regressor of the 31 taps is singular to working precision (condition number "
-    "about 7e14), at 1e-2 s it is well conditioned, so 1e-2 s is used here. The envelope is called "
+    "text says; at 1e-5 s the input excites {rank} of the 31 taps (singular values above 1e-6 of the "
+    "largest), at 1e-2 s all of them, so 1e-2 s is used here. The envelope is called "
     "memoryless with positive weights and thresholds, but (3) depends on the sign of u(k) - u(k-1), most "
     "weights are negative and the thresholds run from -6.4 to 6.4; hence two readings: `one-sided` "
     "(memoryless, the usual deadzone) and `directional` ((3) as printed). The estimate comes nearest to "
@@ -91,6 +91,13 @@ class Paper:
     markov: Array
     """True Markov parameters, (31,)."""
     readings: list[ReadingResult]
+    printed_rank: int
+    """Taps that the input excites at the sampling period that the paper prints, 1e-5 s."""
+
+    @property
+    def errata(self) -> str:
+        """What is printed wrongly in the paper, in one paragraph."""
+        return ERRATA.format(rank=self.printed_rank)
 
 
 def envelope(reading: str) -> Deadzones:
@@ -121,9 +128,9 @@ def envelope(reading: str) -> Deadzones:
     return Deadzones(np.concatenate([size, -size[mirrored]]), np.concatenate([weights, weights[mirrored]]))
 
 
-def excitation() -> Array:
-    """Return u(k) = sum over i = 1..1000 of 5 sin(i Ts k), summed in closed form."""
-    x = PERIOD * np.arange(SAMPLES)
+def excitation(period: float = PERIOD) -> Array:
+    """Return u(k) = sum over i = 1..1000 of 5 sin(i Ts k), summed in closed form; Ts in seconds."""
+    x = period * np.arange(SAMPLES)
     half = np.sin(x / 2)
     at_zero = half == 0
     return np.where(at_zero, 0.0, 5 * np.sin(500 * x) * np.sin(500.5 * x) / np.where(at_zero, 1.0, half))
@@ -162,7 +169,8 @@ def paper() -> Paper:
     """
     system = StateSpace.from_transfer_function(NUMERATOR, DENOMINATOR).zero_order_hold(PERIOD)
     readings = [run_reading(name, system) for name in ("one-sided", "directional", "symmetric")]
-    return Paper(system, np.ravel(system.markov(TAPS)), readings)
+    printed = excitation(1e-5)
+    return Paper(system, np.ravel(system.markov(TAPS)), readings, fir(printed, printed, TAPS).rank)
 
 
 def run_reading(name: str, system: StateSpace) -> ReadingResult:

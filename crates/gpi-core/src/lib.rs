@@ -15,7 +15,7 @@
 //!
 //! Without default features the crate is `no_std`, allocates nothing and has no dependency: it then
 //! holds the [`operators`], for firmware.
-#![cfg_attr(not(feature = "identify"), no_std)]
+#![cfg_attr(not(any(feature = "identify", test)), no_std)]
 
 pub mod operators;
 

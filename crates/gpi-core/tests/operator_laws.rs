@@ -1,4 +1,5 @@
 //! Laws of the play operator and its banks, on random and adversarial input.
+#![cfg(feature = "identify")]
 #![allow(clippy::unwrap_used)]
 
 use gpi_core::operators::{Operator, PlayBank, play};

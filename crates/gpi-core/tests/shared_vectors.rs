@@ -1,4 +1,5 @@
 //! The vectors in `testdata/`, which the Python tests read too; they come from the NumPy oracle.
+#![cfg(feature = "identify")]
 #![allow(clippy::unwrap_used)]
 
 use gpi_core::linear::{

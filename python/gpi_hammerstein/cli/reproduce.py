@@ -12,7 +12,7 @@ from rich.table import Table
 from gpi_hammerstein import files
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import console, picture, print_json, say_written, working, write_json
-from gpi_hammerstein.reproduce import ERRATA, PERIOD, Paper, ReadingResult, paper, response
+from gpi_hammerstein.reproduce import PERIOD, Paper, ReadingResult, paper, response
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def paper_command(out: options.Out = None, as_json: options.Json = False) -> Non
     screen = console()
     screen.print(summary_table(found))
     screen.print()
-    print(textwrap.fill(ERRATA, 100))
+    print(textwrap.fill(found.errata, 100))
     say_written(screen, out, result["files"])
 
 
@@ -80,7 +80,7 @@ def describe(found: Paper) -> dict[str, Any]:
             }
             for reading in found.readings
         ],
-        "errata": ERRATA,
+        "errata": found.errata,
         "files": [],
     }
 

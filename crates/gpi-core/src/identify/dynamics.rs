@@ -17,8 +17,6 @@ pub(super) struct Dynamics {
 #[derive(Clone)]
 pub(super) struct Refit {
     pub system: StateSpace,
-    /// (experiments, outputs).
-    pub offsets: Matrix,
     /// Root mean square over all outputs.
     pub rms: f64,
     criterion: f64,
@@ -126,10 +124,8 @@ pub(super) fn refit(record: &Record, system: StateSpace) -> Result<Refit, Error>
     let deviance: f64 = squares.iter().map(|sum| samples * (sum / samples).max(1e-300).ln()).sum();
     let c = x.rows(0, order).transpose();
     let d = x.rows(order, inputs).transpose();
-    let offsets = Matrix::from_fn(count, outputs, |e, o| x[(order + inputs + e * (1 + order), o)]);
     Ok(Refit {
         system: StateSpace::new(system.a().clone(), system.b().clone(), c, d)?,
-        offsets,
         rms: (squares.sum() / (samples * outputs as f64)).sqrt(),
         criterion: deviance + parameters * samples.ln(),
     })

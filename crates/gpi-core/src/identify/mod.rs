@@ -9,11 +9,14 @@
 //! Everything is fitted and chosen on the record that is given.
 
 mod chain;
+mod dynamic;
 mod dynamics;
 mod grid;
 mod hysteresis;
 mod linearization;
+mod quasi_static;
 mod sensitivity;
+mod start;
 
 pub use chain::{Identification, IdentifyOptions, Round, identify};
 pub use grid::Grid;

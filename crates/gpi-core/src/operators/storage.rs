@@ -59,7 +59,7 @@ impl<T: Sample, const N: usize> Storage for [T; N] {
     }
 }
 
-#[cfg(feature = "identify")]
+#[cfg(any(feature = "identify", test))]
 impl<T: Sample> Storage for Vec<T> {
     type Item = T;
     fn values(&self) -> &[T] {
