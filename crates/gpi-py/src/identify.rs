@@ -2,7 +2,7 @@
 
 use crate::arrays::{from_vector, vector};
 use crate::errors::to_python;
-use crate::linear::Fir;
+use crate::fir::Fir;
 use crate::model::Model;
 use crate::operators::Gpi;
 use crate::record::Record;
@@ -271,9 +271,9 @@ impl Identification {
 /// >>> import gpi_hammerstein as gpi
 /// >>> u = gpi.multisine(4000, 1000.0, (0.5, 400.0), (0.0, 10.0))
 /// >>> y = np.convolve(gpi.PlayBank([0, 2.0], [1.0, 0.5])(u), [0.0, 0.7, 0.3])[:4000]
-/// >>> record = gpi.Record(u, y, rate=1000.0)
+/// >>> record = gpi.Record(u, y, rate=1000.0, warmup=100)
 /// >>> model = gpi.identify(record, half_widths=[0, 1, 2, 3], thresholds=0)
-/// >>> model.error(record)["fit_percent"] > 98
+/// >>> model.error(record)["fit_percent"] > 99
 /// True
 #[pyfunction]
 #[pyo3(signature = (record, *, taps = None, order = None, half_widths = None, thresholds = None,

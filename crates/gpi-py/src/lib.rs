@@ -4,11 +4,14 @@
 mod arrays;
 mod errors;
 mod excitation;
+mod fir;
 mod identify;
-mod linear;
+mod inverse;
 mod model;
 mod operators;
+mod plotting;
 mod record;
+mod state_space;
 
 use pyo3::prelude::*;
 
@@ -17,7 +20,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     errors::register(module)?;
     operators::register(module)?;
-    linear::register(module)?;
+    fir::register(module)?;
+    state_space::register(module)?;
+    inverse::register(module)?;
     record::register(module)?;
     model::register(module)?;
     identify::register(module)?;

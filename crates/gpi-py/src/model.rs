@@ -3,9 +3,9 @@
 use crate::arrays::{from_matrix, from_signal, from_vector, signal, vector};
 use crate::errors::{parameter, to_python};
 use crate::identify::Identification;
-use crate::linear::StateSpace;
 use crate::operators::{Gpi, read_state, write_state};
 use crate::record::{Record, names, units};
+use crate::state_space::StateSpace;
 use gpi_core::ModelState;
 use nalgebra::DVector;
 use pyo3::prelude::*;

@@ -1,0 +1,85 @@
+//! The noncausal FIR inverse.
+
+use crate::arrays::{from_matrices, from_signal, signal};
+use crate::errors::to_python;
+use gpi_core::linear;
+use pyo3::prelude::*;
+use pyo3::types::PySlice;
+
+/// A noncausal FIR inverse: ``v(k) = sum_{i=-d}^{r} h_i y(k-i)``.
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct NoncausalFir {
+    pub(crate) inverse: linear::NoncausalFir,
+}
+
+#[pymethods]
+impl NoncausalFir {
+    /// h_{-d} .. h_r, shape (inputs of G, outputs of G, d + r + 1).
+    #[getter]
+    fn taps<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_matrices(py, self.inverse.taps[0].shape(), &self.inverse.taps)
+    }
+
+    /// Causal taps besides tap 0.
+    #[getter]
+    fn r(&self) -> usize {
+        self.inverse.causal()
+    }
+
+    /// Noncausal taps: samples of preview.
+    #[getter]
+    fn d(&self) -> usize {
+        self.inverse.noncausal
+    }
+
+    /// Norm of the taps left out as a fraction of all; it bounds the relative error of the response.
+    #[getter]
+    fn error(&self) -> f64 {
+        self.inverse.error
+    }
+
+    /// The intermediate signal of y, shape (samples,) or (samples, outputs) (equation 47).
+    fn __call__(&self, y: &Bound<'_, PyAny>) -> PyResult<IntermediateSignal> {
+        let (output, one_dimensional) = signal("y", y)?;
+        let signal = self.inverse.apply(&output).map_err(to_python)?;
+        Ok(IntermediateSignal { signal, one_dimensional })
+    }
+
+    fn __repr__(&self) -> String {
+        format!("NoncausalFir(r={}, d={}, error {:.2e})", self.r(), self.d(), self.error())
+    }
+}
+
+/// An intermediate signal seen through the inverse.
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct IntermediateSignal {
+    signal: linear::IntermediateSignal,
+    one_dimensional: bool,
+}
+
+#[pymethods]
+impl IntermediateSignal {
+    /// v-hat, shaped like the output it was computed from.
+    #[getter]
+    fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_signal(py, &self.signal.values, self.one_dimensional)
+    }
+
+    /// The samples whose inverse saw measured outputs only.
+    #[getter]
+    fn valid<'py>(&self, py: Python<'py>) -> Bound<'py, PySlice> {
+        let valid = &self.signal.valid;
+        PySlice::new(py, valid.start as isize, valid.end as isize, 1)
+    }
+
+    fn __repr__(&self) -> String {
+        let valid = &self.signal.valid;
+        let samples = self.signal.values.nrows();
+        format!("IntermediateSignal({samples} samples, valid {}..{})", valid.start, valid.end)
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<NoncausalFir>()?;
+    module.add_class::<IntermediateSignal>()
+}

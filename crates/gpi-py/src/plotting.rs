@@ -1,0 +1,16 @@
+//! The way from a result's `plot` method to the package's plot module.
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Calls a function of the package's plot module.
+pub(crate) fn plot<'py>(
+    name: &str,
+    result: &Bound<'py, PyAny>,
+    ax: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let options = PyDict::new(result.py());
+    options.set_item("ax", ax)?;
+    let module = result.py().import("gpi_hammerstein.plot")?;
+    module.call_method(name, (result,), Some(&options))
+}
