@@ -4,8 +4,10 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use gpi_core::linear::{EraOptions, TransferFunction, realize};
 
 fn era(criterion: &mut Criterion) {
-    let system =
-        TransferFunction::new(&[1.0, 0.3], &[1.0, -1.9, 0.95]).expect("proper").to_state_space();
+    let system = TransferFunction::new(&[1.0, 0.3], &[1.0, -1.9, 0.95])
+        .expect("proper")
+        .to_state_space()
+        .expect("finite");
     let mut group = criterion.benchmark_group("era");
     group.sample_size(10);
     for blocks in [15, 50, 150, 300] {

@@ -813,3 +813,14 @@ def test_shared_laurent(case):
     assert inverse.error == pytest.approx(case["error"], rel=PRECISION, abs=1e-12)
     assert_agree(inverse(case["y"]).values, case["v"])
     assert_agree(oracle.apply_noncausal(np.array(case["taps"]), case["d"], np.array(case["y"])), case["v"])
+
+
+@pytest.mark.parametrize("numerator", [[1.0], [np.nan]])
+def test_transfer_functions_that_are_not_finite_are_refused(numerator):
+    with pytest.raises(gpi.ParameterError, match="finite"):
+        gpi.StateSpace.from_transfer_function(numerator, [1.0, np.nan])
+
+
+def test_taps_without_channels_are_refused():
+    with pytest.raises(gpi.ParameterError, match="at least one"):
+        gpi.era(np.ones((0, 0, 5)))

@@ -301,7 +301,7 @@ mod tests {
     pub(crate) fn example() -> Model {
         let envelope = Deadzones::new(vec![0.0, 1.0], vec![1.0, -0.3], Reading::OneSided).unwrap();
         let plays = PlayBank::new(vec![0.0, 0.4], vec![2.0, 1.0]).unwrap();
-        let linear = TransferFunction::new(&[0.5], &[1.0, -0.5]).unwrap().to_state_space();
+        let linear = TransferFunction::new(&[0.5], &[1.0, -0.5]).unwrap().to_state_space().unwrap();
         let channel = |name: &str| vec![Channel::new(name, "")];
         let hysteresis = vec![Gpi::new(envelope, plays)];
         Model::new(100.0, channel("u"), channel("y"), hysteresis, linear, vec![7.0]).unwrap()

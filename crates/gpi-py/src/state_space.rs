@@ -140,7 +140,7 @@ impl StateSpace {
         let one = |n: &[f64]| TransferFunction::new(n, &d).map_err(to_python);
         if numerators.first().is_some_and(|tap| tap.len() == 1) {
             let n: Vec<f64> = numerators.iter().map(|tap| tap[0]).collect();
-            return Ok(one(&n)?.to_state_space().into());
+            return Ok(one(&n)?.to_state_space().map_err(to_python)?.into());
         }
         let reference = one(&[])?;
         if numerators.len() != d.len() {
@@ -153,7 +153,8 @@ impl StateSpace {
         }
         let numerator = numerators.into_iter().map(|tap| tap / d[0]).collect();
         let denominator = reference.denominator;
-        Ok(TransferFunction { numerator, denominator }.to_state_space().into())
+        let tf = TransferFunction { numerator, denominator };
+        Ok(tf.to_state_space().map_err(to_python)?.into())
     }
 
     /// State matrix, shape (order, order).

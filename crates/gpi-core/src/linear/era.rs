@@ -38,7 +38,7 @@ pub struct Era {
 ///
 /// ```
 /// use gpi_core::linear::{EraOptions, TransferFunction, realize};
-/// let truth = TransferFunction::new(&[1.0, 0.3], &[1.0, -1.2, 0.6])?.to_state_space();
+/// let truth = TransferFunction::new(&[1.0, 0.3], &[1.0, -1.2, 0.6])?.to_state_space()?;
 /// let era = realize(&truth.markov(41), &EraOptions::default())?;
 /// assert_eq!(era.system.order(), 2);
 /// assert!((era.system.dc_gain()?[0] - truth.dc_gain()?[0]).abs() < 1e-9);
@@ -71,6 +71,10 @@ impl Hankel {
             return Err(Error::TooFewSamples { samples: taps, needed: 3, purpose });
         }
         let (outputs, inputs) = markov[0].shape();
+        if outputs == 0 || inputs == 0 {
+            let requirement = "outputs x inputs of a tap; at least one of each is needed";
+            return Err(Error::parameter("markov", format!("{outputs} x {inputs}"), requirement));
+        }
         let longest = (Self::LARGEST / outputs.max(inputs)).max(1);
         let blocks = blocks.unwrap_or(((taps - 1) / 2).saturating_sub(1).clamp(1, longest));
         if blocks == 0 || taps < 2 * blocks + 1 {
@@ -193,7 +197,8 @@ mod tests {
 
     #[test]
     fn unstable_poles_are_reflected_and_counted() {
-        let growing = TransferFunction::new(&[1.0], &[1.0, -1.1]).unwrap().to_state_space();
+        let growing =
+            TransferFunction::new(&[1.0], &[1.0, -1.1]).unwrap().to_state_space().unwrap();
         let era = realize(&growing.markov(21), &EraOptions::default()).unwrap();
         assert_eq!((era.system.order(), era.reflected), (1, 1));
         assert!((era.system.spectral_radius().unwrap() - 1.0 / 1.1).abs() < 1e-9);
@@ -201,7 +206,7 @@ mod tests {
 
     #[test]
     fn an_order_above_the_rank_is_refused() {
-        let lag = TransferFunction::new(&[1.0], &[1.0, -0.5]).unwrap().to_state_space();
+        let lag = TransferFunction::new(&[1.0], &[1.0, -0.5]).unwrap().to_state_space().unwrap();
         let options = EraOptions { order: Some(4), blocks: None };
         assert!(matches!(
             realize(&lag.markov(21), &options),

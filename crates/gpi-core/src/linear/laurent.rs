@@ -58,7 +58,7 @@ impl StateSpace {
     /// ```
     /// use gpi_core::linear::{InverseOptions, TransferFunction};
     /// // nonminimum phase: the zero at 2 makes the inverse noncausal
-    /// let system = TransferFunction::new(&[1.0, -2.0], &[1.0, 0.0])?.to_state_space();
+    /// let system = TransferFunction::new(&[1.0, -2.0], &[1.0, 0.0])?.to_state_space()?;
     /// let inverse = system.noncausal_inverse(&InverseOptions::default())?;
     /// assert!(inverse.noncausal >= 20 && inverse.error <= 1e-6);
     /// # Ok::<(), gpi_core::Error>(())
@@ -222,7 +222,7 @@ mod tests {
     use crate::linear::TransferFunction;
 
     fn siso(numerator: &[f64], denominator: &[f64]) -> StateSpace {
-        TransferFunction::new(numerator, denominator).unwrap().to_state_space()
+        TransferFunction::new(numerator, denominator).unwrap().to_state_space().unwrap()
     }
 
     #[test]

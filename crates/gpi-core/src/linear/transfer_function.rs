@@ -21,7 +21,7 @@ impl TransferFunction {
     ///
     /// ```
     /// use gpi_core::linear::TransferFunction;
-    /// let lag = TransferFunction::new(&[0.5], &[1.0, -0.5])?.to_state_space();
+    /// let lag = TransferFunction::new(&[0.5], &[1.0, -0.5])?.to_state_space()?;
     /// assert_eq!(lag.markov(3)[2][0], 0.25);
     /// # Ok::<(), gpi_core::Error>(())
     /// ```
@@ -72,7 +72,10 @@ impl TransferFunction {
 
     /// The controllable canonical form, its states scaled so that large coefficients (continuous
     /// time in rad/s) do no harm.
-    pub fn to_state_space(&self) -> StateSpace {
+    ///
+    /// # Errors
+    /// Coefficients that are not finite, or so large that their scaled forms are not.
+    pub fn to_state_space(&self) -> Result<StateSpace, Error> {
         let degree = self.denominator.len() - 1;
         let (outputs, inputs) = self.numerator[0].shape();
         // A bound of the roots' moduli: in units of it, all coefficients are at most 1.
@@ -98,7 +101,7 @@ impl TransferFunction {
         if degree > 0 {
             b.view_mut((0, 0), (inputs, inputs)).fill_with_identity();
         }
-        StateSpace::new(a, b, c, d).unwrap_or_else(|_| unreachable!("the sizes are built to fit"))
+        StateSpace::new(a, b, c, d)
     }
 
     /// G at a point of the complex plane, (outputs, inputs).
@@ -122,7 +125,7 @@ mod tests {
     #[test]
     fn there_and_back() {
         let tf = TransferFunction::new(&[0.2, -0.3], &[2.0, -1.0, 0.6]).unwrap();
-        let back = TransferFunction::from_state_space(&tf.to_state_space()).unwrap();
+        let back = TransferFunction::from_state_space(&tf.to_state_space().unwrap()).unwrap();
         for (there, back) in tf.denominator.iter().zip(&back.denominator) {
             assert!((there - back).abs() < 1e-14);
         }

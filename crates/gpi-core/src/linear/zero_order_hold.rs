@@ -10,7 +10,7 @@ use crate::{Error, Matrix};
 /// use gpi_core::linear::{TransferFunction, zero_order_hold};
 /// // (48) of the paper, sampled every 10 ms, gives (49)
 /// let continuous =
-///     TransferFunction::new(&[3.391e10], &[1.0, 3759.0, 2.063e7, 7.514e10])?.to_state_space();
+///     TransferFunction::new(&[3.391e10], &[1.0, 3759.0, 2.063e7, 7.514e10])?.to_state_space()?;
 /// let discrete = TransferFunction::from_state_space(&zero_order_hold(&continuous, 1e-2)?)?;
 /// assert!((discrete.numerator[1][0] - 0.255_977).abs() < 1e-6);
 /// assert!((discrete.denominator[1] + 0.574_648).abs() < 1e-6);
@@ -41,7 +41,8 @@ mod tests {
     fn paper_example(period: f64) -> TransferFunction {
         let continuous = TransferFunction::new(&[3.391e10], &[1.0, 3759.0, 2.063e7, 7.514e10])
             .unwrap()
-            .to_state_space();
+            .to_state_space()
+            .unwrap();
         TransferFunction::from_state_space(&zero_order_hold(&continuous, period).unwrap()).unwrap()
     }
 

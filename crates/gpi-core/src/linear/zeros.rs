@@ -108,7 +108,8 @@ mod tests {
     use crate::linear::TransferFunction;
 
     fn zeros(numerator: &[f64], denominator: &[f64]) -> Vec<Complex64> {
-        let system = TransferFunction::new(numerator, denominator).unwrap().to_state_space();
+        let system =
+            TransferFunction::new(numerator, denominator).unwrap().to_state_space().unwrap();
         let mut zeros = system.zeros().unwrap();
         zeros.sort_by(|a, b| a.re.total_cmp(&b.re));
         zeros
@@ -117,7 +118,7 @@ mod tests {
     #[test]
     fn a_zero_annuls_the_transfer_function() {
         let tf = TransferFunction::new(&[0.5, 1.0, 0.3], &[1.0, -1.0, 0.41]).unwrap();
-        let zeros = tf.to_state_space().zeros().unwrap();
+        let zeros = tf.to_state_space().unwrap().zeros().unwrap();
         assert_eq!(zeros.len(), 2);
         assert!(zeros.iter().all(|&zero| tf.evaluate(zero)[(0, 0)].norm() < 1e-12));
     }
