@@ -2,14 +2,13 @@
 
 use crate::arrays::{from_vector, vector};
 use crate::errors::to_python;
-use crate::fir::Fir;
+use crate::identification::Identification;
 use crate::model::Model;
 use crate::operators::Gpi;
 use crate::record::Record;
 use gpi_core::Error;
 use gpi_core::identify::{self as core, Grid, IdentifyOptions};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 /// A count, or values.
 fn grid(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Grid>> {
@@ -160,76 +159,6 @@ fn fit_hysteresis(
     Ok(HysteresisFit { fit })
 }
 
-/// How a model was identified.
-#[pyclass(module = "gpi_hammerstein", frozen)]
-pub(crate) struct Identification {
-    found: core::Identification,
-}
-
-#[pymethods]
-impl Identification {
-    /// The paper's first stage, u to y; None where the input excites no more than gain and delay.
-    #[getter]
-    fn fir(&self) -> Option<Fir> {
-        self.found.fir.clone().map(|fir| Fir { fir })
-    }
-
-    /// Singular values of ERA's Hankel matrix in the best round, descending.
-    #[getter]
-    fn singular_values<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        from_vector(py, &self.found.singular_values)
-    }
-
-    /// Unstable poles that were reflected into the unit circle.
-    #[getter]
-    fn reflected(&self) -> usize {
-        self.found.reflected
-    }
-
-    /// Taps that the input supports; None when there is no limit in sight.
-    #[getter]
-    fn supported_taps(&self) -> Option<usize> {
-        Some(self.found.supported_taps).filter(|&taps| taps < usize::MAX)
-    }
-
-    /// Delay in samples where the linear part is a gain with a delay, else None.
-    #[getter]
-    fn delay(&self) -> Option<usize> {
-        self.found.delay
-    }
-
-    /// What was left after each round: ``rms`` (training data, output's unit), ``order``, ``taps``.
-    #[getter]
-    fn rounds<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let row = |round: &core::Round| {
-            let row = PyDict::new(py);
-            row.set_item("rms", round.rms)?;
-            row.set_item("order", round.order)?;
-            row.set_item("taps", round.taps)?;
-            Ok(row)
-        };
-        self.found.rounds.iter().map(row).collect()
-    }
-
-    /// Samples at the start of each experiment that were not scored.
-    #[getter]
-    fn warmups(&self) -> Vec<usize> {
-        self.found.warmups.clone()
-    }
-
-    /// What the user should know, in sentences.
-    #[getter]
-    fn notes(&self) -> Vec<String> {
-        self.found.notes.clone()
-    }
-
-    fn __repr__(&self) -> String {
-        let rms: Vec<String> =
-            self.found.rounds.iter().map(|round| format!("{:.4e}", round.rms)).collect();
-        format!("Identification(rms by round: {})", rms.join(", "))
-    }
-}
-
 /// Identifies a model from a record.
 ///
 /// G comes from FIR least squares and ERA, the hysteresis from bounded least squares behind G, and
@@ -303,7 +232,6 @@ fn identify(
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<HysteresisFit>()?;
-    module.add_class::<Identification>()?;
     module.add_function(wrap_pyfunction!(fit_hysteresis, module)?)?;
     module.add_function(wrap_pyfunction!(identify, module)?)
 }

@@ -5,6 +5,7 @@ mod arrays;
 mod errors;
 mod excitation;
 mod fir;
+mod identification;
 mod identify;
 mod inverse;
 mod model;
@@ -25,6 +26,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     inverse::register(module)?;
     record::register(module)?;
     model::register(module)?;
+    identification::register(module)?;
     identify::register(module)?;
     excitation::register(module)
 }

@@ -2,7 +2,7 @@
 
 use crate::arrays::{from_matrix, from_signal, from_vector, signal, vector};
 use crate::errors::{parameter, to_python};
-use crate::identify::Identification;
+use crate::identification::Identification;
 use crate::operators::{Gpi, read_state, write_state};
 use crate::record::{Record, names, units};
 use crate::state_space::StateSpace;

@@ -1,58 +1,10 @@
 //! The whole chain: excitation, start, rounds, model.
 
+use super::identification::{Identification, IdentifyOptions};
 use super::start::Start;
-use super::{Grid, Progress, report};
-use crate::linear::{Fir, excitation_limit};
-use crate::{Error, Model, Record};
-
-/// What [`identify`] chooses (`None`) and what is given.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct IdentifyOptions {
-    /// Taps of the FIR estimate.
-    pub taps: Option<usize>,
-    /// Order of the linear dynamics.
-    pub order: Option<usize>,
-    /// Half-widths of the plays, in the unit of the input.
-    pub half_widths: Option<Grid>,
-    /// Thresholds of the deadzones, in the unit of the input.
-    pub thresholds: Option<Grid>,
-    /// Restricts the linear part to a gain with a delay of this many samples.
-    pub delay: Option<usize>,
-}
-
-/// One pass of hysteresis and dynamics.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Round {
-    /// Root mean square of what is left on the training data, in the output's unit.
-    pub rms: f64,
-    /// Order of G.
-    pub order: usize,
-    /// Taps of the FIR estimate behind it.
-    pub taps: usize,
-}
-
-/// A model and what it rests on.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Identification {
-    /// The model, in its best round.
-    pub model: Model,
-    /// The paper's first stage, u to y; `None` where the input excites no more than gain and delay.
-    pub fir: Option<Fir>,
-    /// Singular values of ERA's Hankel matrix in the best round.
-    pub singular_values: Vec<f64>,
-    /// Unstable poles that ERA reflected in the best round.
-    pub reflected: usize,
-    /// Taps that the input supports, `usize::MAX` when there is no limit in sight.
-    pub supported_taps: usize,
-    /// Delay in samples where the linear part is a gain with a delay.
-    pub delay: Option<usize>,
-    /// What was left after each round.
-    pub rounds: Vec<Round>,
-    /// Samples at the start of each experiment that were not scored: the plays' unknown past.
-    pub warmups: Vec<usize>,
-    /// What the user should know, in sentences.
-    pub notes: Vec<String>,
-}
+use super::{Progress, report};
+use crate::linear::excitation_limit;
+use crate::{Error, Record};
 
 /// Identifies a model from a record.
 ///

@@ -1,8 +1,8 @@
 //! Hysteresis and linear dynamics in turn, until nothing is gained.
 
-use super::chain::{Identification, Round};
 use super::dynamics::{self, Dynamics};
 use super::hysteresis::fit;
+use super::identification::{Identification, Round};
 use super::linearization::Freedom;
 use super::sensitivity::Derivatives;
 use super::start::{Start, rescale};

@@ -13,14 +13,16 @@ mod dynamic;
 mod dynamics;
 mod grid;
 mod hysteresis;
+mod identification;
 mod linearization;
 mod quasi_static;
 mod sensitivity;
 mod start;
 
-pub use chain::{Identification, IdentifyOptions, Round, identify};
+pub use chain::identify;
 pub use grid::Grid;
 pub use hysteresis::{HysteresisFit, fit_hysteresis};
+pub use identification::{Identification, IdentifyOptions, Round};
 
 /// Called with the stage's name and the fraction done (0 to 1); `false` asks to stop, which ends the
 /// work with [`Error::Interrupted`](crate::Error::Interrupted).

@@ -1,7 +1,7 @@
 //! Hysteresis behind a gain with a delay, where the input excites no more.
 
-use super::chain::{Identification, Round};
 use super::hysteresis::fit;
+use super::identification::{Identification, Round};
 use super::linearization::{Freedom, Point};
 use super::sensitivity::Derivatives;
 use super::start::{Start, rescale};

@@ -1,8 +1,8 @@
 //! What every identification starts from: the grids, the past, the training data.
 
 use super::Grid;
-use super::chain::{Identification, IdentifyOptions, Round};
 use super::hysteresis::{forgets_at, range};
+use super::identification::{Identification, IdentifyOptions, Round};
 use super::linearization::Point;
 use super::sensitivity::Parameters;
 use crate::linear::{Fir, StateSpace};
