@@ -24,7 +24,7 @@ def piezo() -> None:
     folder = DATA / "measured" / "piezo-p885-dbo"
     train = gpi.read_record(folder / "model_1hz_fullscale.csv")
     test = gpi.read_record(folder / "test_1hz_varying_amplitude.csv", warmup=200)
-    print("piezo-p885-dbo, held out, rms in % of the 49.42 um span (at most 0.8 asked for)")
+    print("piezo-p885-dbo, held out, rms in % of the 49.42 um span (target: 0.8)")
     for name, options in [
         ("defaults", {}),
         ("12 plays, 5 deadzones", {"half_widths": 12, "thresholds": 5}),
@@ -47,7 +47,7 @@ def steering_mirror() -> None:
     """FIR and ERA on realisations 0 to 4, tested on 5, second period."""
     folder = DATA / "measured" / "piezo-fsm-cubespec"
     print("piezo-fsm-cubespec, held-out realisation, relative error in % up to 3 kHz")
-    print("  asked for: FIR 5.2 / 4.4 / 4.1, ERA of order 40 stable and 9 / 8 / 8")
+    print("  targets: FIR 5.2 / 4.4 / 4.1, ERA of order 40 stable and 9 / 8 / 8")
     for level in (100, 200, 300):
         u = np.load(folder / f"u_{level}mV_train.npy")
         y = np.load(folder / f"y_{level}mV_train.npy")
