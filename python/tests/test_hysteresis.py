@@ -463,3 +463,11 @@ def test_two_inputs_and_two_outputs():
     assert predicted.shape == (3000, 2)
     for output in range(2):
         assert oracle.errors(truth[:, output], predicted[:, output])["nrmse"] < 2 * NOISE
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_output_that_ignores_its_input_is_no_error(seed):
+    rng = np.random.default_rng(seed)
+    record = gpi.Record(rng.standard_normal(1500), rng.standard_normal(1500), rate=1.0)
+    model = gpi.identify(record)
+    assert -5.0 < model.error(record)["fit_percent"] < 40.0

@@ -14,8 +14,6 @@ from gpi_hammerstein.cli.output import picture
 # v-hat is worth a look while the noise that the inverse of G makes of the residual stays below this
 # fraction of the span of v.
 NOISE_SHARE = 0.05
-# The inverse of a higher order takes longer than all the rest.
-LARGEST_ORDER = 20
 
 
 def write_pictures(folder: Path, model: Model, train: Record, test: Record | None) -> None:
@@ -54,7 +52,7 @@ def intermediate_seen(model: Model, record: Record) -> NDArray[np.float64] | Non
     a loop of its own.
     """
     single = len(model.input_names) == len(model.output_names) == 1
-    if not single or model.linear.order > LARGEST_ORDER:
+    if not single:
         return None
     try:
         inverse = model.linear.noncausal_inverse()

@@ -55,6 +55,10 @@ impl Start<'_> {
             let freedom = Freedom { derivatives, numerator };
             let linear = &current.refit.system;
             point = fit(point, linear, &self.record, freedom, STEPS, progress)?.point;
+            if point.channels.iter().any(|c| c.weights.iter().all(|&weight| weight == 0.0)) {
+                // y does not follow this input: there is no v to go on from.
+                break;
+            }
             current = dynamics_of(&self.driven(&point)?, &mut taps, largest, order, progress)?;
             let rms = self.free_run(&point, &current.refit.system)?.0;
             rounds.push(Round { rms, order: current.refit.system.order(), taps });
@@ -74,15 +78,7 @@ impl Start<'_> {
             }
             polish |= stalled;
         }
-        let (rms, mut point, dynamics) = best;
-        if rms >= self.spread() {
-            let share = 100.0 * rms / self.spread();
-            self.notes.push(format!(
-                "the dynamics found leave {share:.0} % of what a constant leaves: the linear part is a \
-                 gain with a delay instead"
-            ));
-            return self.quasi_static(None, supported, progress);
-        }
+        let (_, mut point, dynamics) = best;
         let mut linear = dynamics.refit.system;
         rescale(&mut point, &mut linear)?;
         if dynamics.reflected > 0 {

@@ -28,10 +28,6 @@ pub use identification::{Identification, IdentifyOptions, Round};
 /// work with [`Error::Interrupted`](crate::Error::Interrupted).
 pub type Progress<'a> = &'a mut dyn FnMut(&str, f64) -> bool;
 
-fn report(
-    progress: &mut dyn FnMut(&str, f64) -> bool,
-    stage: &str,
-    done: f64,
-) -> Result<(), crate::Error> {
+fn report(progress: Progress, stage: &str, done: f64) -> Result<(), crate::Error> {
     if progress(stage, done) { Ok(()) } else { Err(crate::Error::Interrupted) }
 }

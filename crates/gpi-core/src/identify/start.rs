@@ -10,7 +10,7 @@ use crate::{Error, Experiment, Matrix, Model, Record};
 
 /// What all rounds start from.
 pub(super) struct Start<'a> {
-    pub(super) given: &'a Record,
+    given: &'a Record,
     /// The record without the samples that the plays' unknown past disturbs, and without the mean
     /// of each output.
     pub(super) record: Record,
@@ -111,18 +111,6 @@ impl<'a> Start<'a> {
         };
         let experiments = self.record.experiments().iter().zip(&point.starts).map(driven);
         self.record.with_experiments(experiments.collect())
-    }
-
-    /// Root mean square of the outputs, the mean of each experiment taken out: what a constant leaves.
-    pub(super) fn spread(&self) -> f64 {
-        let mut squares = 0.0;
-        for experiment in self.record.experiments() {
-            let rows = experiment.output.nrows() - experiment.warmup;
-            for column in experiment.output.rows(experiment.warmup, rows).column_iter() {
-                squares += column.variance() * rows as f64;
-            }
-        }
-        (squares / (self.record.scored() * self.record.outputs().len()) as f64).sqrt()
     }
 
     /// Runs the model free over the training data: root mean square of what is left, with the mean
