@@ -32,6 +32,7 @@ from gpi_hammerstein._native import (
     ParameterError,
     PlayBank,
     Record,
+    Refinement,
     StateSpace,
     __version__,
     decaying_triangle,
@@ -41,6 +42,8 @@ from gpi_hammerstein._native import (
     identify,
     multisine,
     prbs,
+    refine,
+    sensitivities,
 )
 from gpi_hammerstein.files import load_model as load
 from gpi_hammerstein.files import save_model as save
@@ -64,6 +67,7 @@ __all__ = [
     "ParameterError",
     "PlayBank",
     "Record",
+    "Refinement",
     "StateSpace",
     "__version__",
     "decaying_triangle",
@@ -76,7 +80,9 @@ __all__ = [
     "plot",
     "prbs",
     "read_record",
+    "refine",
     "save",
+    "sensitivities",
 ]
 
 

@@ -6,12 +6,16 @@ Nothing here imports the package. Signals are (samples, channels), Markov parame
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import copy
+import re
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg
 
 EXCITATION_TOLERANCE = 1e-6
+
+StateMatrices = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 # --- operators -----------------------------------------------------------------------------------
 
@@ -226,7 +230,7 @@ def simulate(a, b, c, d, v, state=None):
     return y, x
 
 
-def markov(a, b, c, d, count):
+def markov(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, count: int) -> np.ndarray:
     """H_0 = D, H_j = C A^(j-1) B."""
     taps = np.zeros((*d.shape, count))
     for j in range(count):
@@ -255,7 +259,9 @@ def evaluate(a, b, c, d, point):
     return c @ np.linalg.solve(point * np.eye(len(a)) - a, b.astype(complex)) + d
 
 
-def frequency_response(a, b, c, d, frequencies):
+def frequency_response(
+    a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, frequencies: np.ndarray
+) -> np.ndarray:
     """G(e^jw), (frequencies, outputs, inputs)."""
     points = np.exp(1j * np.asarray(frequencies))[:, None, None]
     return c @ np.linalg.solve(points * np.eye(len(a)) - a, b.astype(complex)) + d
@@ -300,6 +306,150 @@ def zero_order_hold(a, b, c, d, period):
     augmented[:order, :order], augmented[:order, order:] = a, b
     exponential = scipy.linalg.expm(augmented * period)
     return exponential[:order, :order], exponential[:order, order:], c, d
+
+
+# --- the whole model, by the names of its parameters ------------------------------------------------
+
+
+@dataclass
+class Hysteresis:
+    """One input's deadzones, thresholds ascending, and plays."""
+
+    thresholds: np.ndarray
+    deadzone_weights: np.ndarray
+    half_widths: np.ndarray
+    weights: np.ndarray
+    reading: str = "one-sided"
+
+
+@dataclass
+class Section:
+    """x1+ = -a1 x1 + x2 + b1 v, x2+ = -a2 x1 + b2 v, y = C x; or x+ = -a1 x + b1 v."""
+
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+
+    def matrix(self) -> np.ndarray:
+        shifted = np.eye(len(self.a), k=1)
+        shifted[:, 0] -= self.a
+        return shifted
+
+
+@dataclass
+class Start:
+    """F_i(-1) = z(0) + sides_i r_i of each input, and how far the sections are from standing still.
+
+    Without `sides` the plays come from rest.
+    """
+
+    sides: list[np.ndarray] | None
+    state: np.ndarray
+
+
+@dataclass
+class Plant:
+    """y = z^-delay (D + sum of sections) P[D[u]] + offset.
+
+    `held` names for each input the output at which G(1) is kept, and its value: that element of
+    `feedthrough` follows from the sections. `offsets` holds for each experiment (knots, outputs), evenly
+    spaced with straight lines between them; `starts` holds None for an experiment that comes from rest.
+    """
+
+    hysteresis: list[Hysteresis]
+    sections: list[Section]
+    feedthrough: np.ndarray
+    held: list[tuple[int, float]]
+    delay: int = 0
+    offsets: list[np.ndarray] = field(default_factory=list)
+    starts: list[Start | None] = field(default_factory=list)
+    inputs: list[str] = field(default_factory=lambda: ["u"])
+    outputs: list[str] = field(default_factory=lambda: ["y"])
+
+    def state_space(self) -> StateMatrices:
+        """(A, B, C, D) of G without its delay."""
+        inputs, outputs = len(self.inputs), len(self.outputs)
+        a = scipy.linalg.block_diag(np.zeros((0, 0)), *[section.matrix() for section in self.sections])
+        b = np.vstack([np.zeros((0, inputs)), *[section.b for section in self.sections]])
+        c = np.hstack([np.zeros((outputs, 0)), *[section.c for section in self.sections]])
+        d = self.feedthrough.copy()
+        for column, (row, gain) in enumerate(self.held):
+            d[row, column] += gain - dc_gain(a, b, c, d)[row, column]
+        return a, b, c, d
+
+    def delayed_state_space(self) -> StateMatrices:
+        """(A, B, C, D) with the delay as a chain of states before the sections."""
+        a, b, c, d = self.state_space()
+        for _ in range(self.delay):
+            chained = np.zeros((len(a), b.shape[1]))
+            a = np.block([[a, b], [np.zeros((b.shape[1], len(a))), np.zeros((b.shape[1], b.shape[1]))]])
+            c = np.hstack([c, d])
+            b, d = np.vstack([chained, np.eye(b.shape[1])]), np.zeros_like(d)
+        return a, b, c, d
+
+    def intermediate(self, u: np.ndarray, start: Start | None = None) -> np.ndarray:
+        """v (samples, inputs), from rest or from a start."""
+        v = np.zeros_like(u)
+        for i, channel in enumerate(self.hysteresis):
+            z = deadzones(u[:, i], channel.thresholds, channel.deadzone_weights, channel.reading)
+            from_rest = start is None or start.sides is None
+            before = None if from_rest else z[0] + start.sides[i] * channel.half_widths
+            v[:, i], _ = play_bank(z, channel.half_widths, channel.weights, before)
+        return v
+
+    def simulate(self, u: np.ndarray, experiment: int = 0, first: int = 0) -> np.ndarray:
+        """The output (samples, outputs) where v stood at v(0) until the record began.
+
+        What the start says of the sections' state holds at sample `first`.
+        """
+        start = self.starts[experiment]
+        v = self.intermediate(u, start)
+        v = v[np.maximum(np.arange(len(v)) - self.delay, 0)]
+        a, b, c, d = self.state_space()
+        state = np.linalg.solve(np.eye(len(a)) - a, b @ v[0])
+        y, _ = simulate(a, b, c, d, v, state)
+        if start is not None:
+            free, _ = simulate(a, b, c, d, np.zeros_like(v[first:]), start.state)
+            y[first:] += free
+        knots = self.offsets[experiment]
+        at = np.linspace(0, len(knots) - 1, len(u))
+        for j in range(y.shape[1]):
+            y[:, j] += np.interp(at, np.arange(len(knots)), knots[:, j])
+        return y
+
+    def _place(self, name: str) -> tuple[np.ndarray, int | tuple[int, int]]:
+        """The array and the index at which a named parameter stands."""
+        if match := re.fullmatch(r"(\w+)\.(deadzone_weights|thresholds|weights|half_widths)\[(\d+)\]", name):
+            channel = self.hysteresis[self.inputs.index(match[1])]
+            return getattr(channel, match[2]), int(match[3])
+        if match := re.fullmatch(r"section\[(\d+)\]\.a(\d)", name):
+            return self.sections[int(match[1])].a, int(match[2]) - 1
+        if match := re.fullmatch(r"section\[(\d+)\]\.b(\d)\[(\w+)\]", name):
+            return self.sections[int(match[1])].b, (int(match[2]) - 1, self.inputs.index(match[3]))
+        if match := re.fullmatch(r"section\[(\d+)\]\.c(\d)\[(\w+)\]", name):
+            return self.sections[int(match[1])].c, (self.outputs.index(match[3]), int(match[2]) - 1)
+        if match := re.fullmatch(r"feedthrough\[(\w+), (\w+)\]", name):
+            return self.feedthrough, (self.outputs.index(match[1]), self.inputs.index(match[2]))
+        if match := re.fullmatch(r"offset\[(\d+)\]\.(\w+)(?:\[(\d+)\])?", name):
+            return self.offsets[int(match[1])], (int(match[3] or 0), self.outputs.index(match[2]))
+        if match := re.fullmatch(r"start\[(\d+)\]\.state\[(\d+)\]", name):
+            return self.starts[int(match[1])].state, int(match[2])
+        if match := re.fullmatch(r"start\[(\d+)\]\.(\w+)\[(\d+)\]", name):
+            return self.starts[int(match[1])].sides[self.inputs.index(match[2])], int(match[3])
+        raise KeyError(name)
+
+    def value(self, name: str) -> float:
+        """The parameter of this name."""
+        array, index = self._place(name)
+        return float(array[index])
+
+    def with_values(self, values: dict[str, float]) -> Plant:
+        """A copy with other values of the named parameters."""
+        moved = copy.deepcopy(self)
+        for name, value in values.items():
+            array, index = moved._place(name)
+            array[index] = value
+        return moved
 
 
 # --- the noncausal inverse -----------------------------------------------------------------------

@@ -1,9 +1,13 @@
-"""Small record files for the tests of reading and of the command line."""
+"""Small record files for the tests of reading and of the command line, and models from numbers."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+import gpi_hammerstein as gpi
+import oracle
 
 Array = NDArray[np.float64]
 
@@ -29,7 +33,8 @@ def drive(samples: int = 2000, seed: int = 0) -> Array:
     lines = np.arange(1.0, 490.0)
     phases = 2 * np.pi * random.random(len(lines))
     fast = np.cos(2 * np.pi * np.outer(t, lines) + phases).sum(axis=1)
-    return np.minimum(1.0, t / 0.1) * (2.0 * np.sin(2 * np.pi * 1.5 * t) + 0.8 * fast / fast.std())
+    u: Array = np.minimum(1.0, t / 0.1) * (2.0 * np.sin(2 * np.pi * 1.5 * t) + 0.8 * fast / fast.std())
+    return u
 
 
 def write_csv(path: Path, columns: dict[str, object]) -> Path:
@@ -45,3 +50,32 @@ def good_columns(samples: int = 2000, seed: int = 0) -> dict[str, object]:
     u = drive(samples, seed)
     t = np.round(np.arange(samples) / RATE, 9)
     return {"t_s": t, "u_V": np.round(u, 6), "y_um": np.round(actuator(u, seed=seed + 1), 6)}
+
+
+def model_of(plant: oracle.Plant, rate: float = RATE) -> gpi.Model:
+    """The model with the numbers of a plant; the offset is that of its first experiment."""
+
+    def matrix(values: Array) -> list[object]:
+        return [np.ravel(values, order="F").tolist(), *values.shape]
+
+    a, b, c, d = plant.delayed_state_space()
+    layout = {
+        "schema": "gpi-model/1",
+        "rate": rate,
+        "inputs": [{"name": name, "unit": ""} for name in plant.inputs],
+        "outputs": [{"name": name, "unit": ""} for name in plant.outputs],
+        "hysteresis": [
+            {
+                "envelope": {
+                    "thresholds": channel.thresholds.tolist(),
+                    "weights": channel.deadzone_weights.tolist(),
+                    "reading": channel.reading,
+                },
+                "plays": {"half_widths": channel.half_widths.tolist(), "weights": channel.weights.tolist()},
+            }
+            for channel in plant.hysteresis
+        ],
+        "linear": {"a": matrix(a), "b": matrix(b), "c": matrix(c), "d": matrix(d)},
+        "offsets": plant.offsets[0].mean(axis=0).tolist(),
+    }
+    return gpi.Model.from_json(json.dumps(layout))

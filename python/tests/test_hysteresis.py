@@ -47,7 +47,7 @@ def test_plays_are_recovered():
     np.testing.assert_allclose(fit.gpi(u) + fit.offset, v, rtol=0, atol=1e-6)
     assert fit.offset == pytest.approx(0, abs=1e-6)
     assert fit.rms < 1e-6
-    assert fit.converged
+    assert fit.status == "converged"
 
 
 def test_deadzones_and_plays_are_recovered_together():
@@ -295,10 +295,12 @@ def test_model_names_and_origin(model):
     assert origin.delay is None
     assert origin.supported_taps is None or origin.supported_taps > 30
     assert len(origin.singular_values) > model.linear.order
-    rounds = origin.rounds
-    assert min(entry["rms"] for entry in rounds) == pytest.approx(best_rms(model), rel=0.02)
-    assert any(entry["order"] == model.linear.order for entry in rounds)
-    assert origin.fir.markov.shape[2] in [entry["taps"] for entry in rounds]
+    assert origin.fir.markov.shape[2] in [entry["taps"] for entry in origin.rounds]
+    (chosen,) = [entry for entry in origin.candidates if entry["chosen"]]
+    assert chosen["criterion"] == min(entry["criterion"] for entry in origin.candidates)
+    assert chosen["rms"] == pytest.approx(best_rms(model), rel=0.02)
+    assert chosen["rms"] < min(entry["rms"] for entry in origin.rounds), "refined together"
+    assert chosen["order"] + chosen["delay"] == model.linear.order
     assert all(word in repr(model) for word in ["drive [V]", "x [um]", f"order {model.linear.order}"])
     assert gpi.Model.from_json(model.to_json()).identification is None
 

@@ -6,6 +6,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 
 import gpi_hammerstein as gpi
 from records import RATE, actuator, drive
@@ -56,6 +57,10 @@ def test_given_axes_are_drawn_on_and_returned(record: gpi.Record, model: gpi.Mod
         lambda ax: gpi.plot.markov(impulse_response, ax=ax),
         lambda ax: gpi.plot.bode(system, RATE, ax=ax),
         lambda ax: gpi.plot.bode(system, ax=ax),
+        lambda ax: gpi.plot.bode(model.linear, RATE, ax, refinement=model.refinement),
+        lambda ax: gpi.plot.markov(model, ax=ax),
+        lambda ax: gpi.plot.candidates(model, ax=ax),
+        lambda ax: gpi.plot.history(model, ax=ax),
         lambda ax: gpi.plot.singular_values(system, ax=ax),
         lambda ax: gpi.plot.fit(model, record, ax=ax),
         lambda ax: gpi.plot.residual(model, record, ax=ax),
@@ -108,3 +113,70 @@ def test_several_channels_have_a_line_each() -> None:
     assert ax.get_legend() is not None and len(ax.get_legend().get_texts()) == 4
     system = gpi.StateSpace(0.5 * np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))
     assert len(gpi.plot.bode(system).lines) == 4
+
+
+def half_widths_of(band: PolyCollection) -> np.ndarray:
+    """Half the height of a shaded band at every x."""
+    corners = band.get_paths()[0].vertices
+    return np.array([np.ptp(corners[corners[:, 0] == x, 1]) / 2 for x in np.unique(corners[:, 0])])
+
+
+def test_bands_are_95_percent(model: gpi.Model) -> None:
+    angles = np.geomspace(1e-3 * np.pi, np.pi, 1000)
+    magnitude, phase = model.refinement.response_std(angles)
+    ax = gpi.plot.bode(model.linear, refinement=model.refinement)
+    right = ax.figure.axes[1]
+    decibels = 1.96 * 20 / np.log(10) * magnitude.ravel()
+    np.testing.assert_allclose(half_widths_of(ax.collections[0]), decibels, atol=1e-9)
+    degrees = 1.96 * np.degrees(phase.ravel())
+    np.testing.assert_allclose(half_widths_of(right.collections[0]), degrees, atol=1e-9)
+    ax = gpi.plot.markov(model)
+    taps = len(ax.lines[0].get_xdata())
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), model.linear.markov(taps).ravel())
+    deviations = model.refinement.markov_std(taps).ravel()
+    np.testing.assert_allclose(half_widths_of(ax.collections[0]), 1.96 * deviations, atol=1e-12)
+
+
+def test_the_loop_has_the_band_of_the_model(record: gpi.Record, model: gpi.Model) -> None:
+    u = record.u[0][:, 0]
+    ax = gpi.plot.loop(u, record.y[0], model)
+    [band] = ax.collections
+    heights = [np.ptp(path.vertices[:, 1]) for path in band.get_paths()]
+    assert len(heights) == len(u) - 1
+    widest = 1.96 * model.refinement.loop_std(u).max()
+    [text] = [text.get_text() for text in ax.get_legend().get_texts() if "band" in text.get_text()]
+    assert text == f"95 % band, at most \u00b1{widest:.2g} um"
+
+
+def test_every_candidate_is_drawn_and_the_chosen_one_marked(model: gpi.Model) -> None:
+    rows = model.identification.candidates
+    ax = gpi.plot.candidates(model)
+    points, ring = ax.lines
+    np.testing.assert_allclose(points.get_xdata(), [row["used"] for row in rows])
+    assert points.get_ydata().min() == 0
+    [chosen] = [row for row in rows if row["chosen"]]
+    assert list(ring.get_xdata()) == [chosen["used"]]
+    numbers = {text.get_text() for text in ax.texts}
+    assert f"{chosen['order']}/{chosen['plays']}/{chosen['deadzones']}/{chosen['delay']}" in numbers
+    squares = ax.figure.axes[1].lines[0]
+    np.testing.assert_allclose(squares.get_ydata(), [row["rms"] for row in rows])
+
+
+def test_history_ends_at_the_residual_above_the_floor(model: gpi.Model) -> None:
+    steps, floor = gpi.plot.history(model).lines
+    np.testing.assert_array_equal(steps.get_ydata(), model.refinement.history)
+    assert floor.get_ydata()[0] == model.refinement.noise_floor["rms"][0]
+
+
+def test_a_loaded_model_has_no_bands_and_says_so(record: gpi.Record, model: gpi.Model) -> None:
+    loaded = gpi.Model.from_json(model.to_json())
+    assert "not from identify" in gpi.plot.candidates(loaded).texts[0].get_text()
+    assert "not refined" in gpi.plot.history(loaded).texts[0].get_text()
+    assert not gpi.plot.markov(loaded).collections
+    assert not gpi.plot.loop(record.u[0], record.y[0], loaded).collections
+
+
+def test_a_refinement_of_other_channels_is_refused(model: gpi.Model) -> None:
+    system = gpi.StateSpace(0.5 * np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))
+    with pytest.raises(gpi.ParameterError, match="`refinement` belongs to 1 outputs"):
+        gpi.plot.bode(system, refinement=model.refinement)

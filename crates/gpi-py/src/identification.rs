@@ -57,6 +57,27 @@ impl Identification {
         self.found.rounds.iter().map(row).collect()
     }
 
+    /// The structures that were compared, in the order they were tried: ``delay``, ``order``, ``plays``,
+    /// ``deadzones``, ``rms``, ``parameters``, ``used`` (the same, counted in samples of white noise), ``criterion``
+    /// (``N ln rms^2 + used ln N``, the least is chosen), ``chosen``.
+    #[getter]
+    fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let row = |(place, candidate): (usize, &core::Candidate)| {
+            let row = PyDict::new(py);
+            row.set_item("delay", candidate.delay)?;
+            row.set_item("order", candidate.order)?;
+            row.set_item("plays", candidate.plays)?;
+            row.set_item("deadzones", candidate.deadzones)?;
+            row.set_item("rms", candidate.rms)?;
+            row.set_item("parameters", candidate.parameters)?;
+            row.set_item("used", candidate.used)?;
+            row.set_item("criterion", candidate.criterion)?;
+            row.set_item("chosen", place == self.found.chosen)?;
+            Ok(row)
+        };
+        self.found.candidates.iter().enumerate().map(row).collect()
+    }
+
     /// Samples at the start of each experiment that were not scored.
     #[getter]
     fn warmups(&self) -> Vec<usize> {

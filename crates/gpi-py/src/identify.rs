@@ -4,8 +4,9 @@ use crate::arrays::{from_vector, vector};
 use crate::errors::to_python;
 use crate::identification::Identification;
 use crate::model::Model;
-use crate::operators::Gpi;
+use crate::operators::{Gpi, read_reading};
 use crate::record::Record;
+use crate::refine::Refinement;
 use gpi_core::Error;
 use gpi_core::identify::{self as core, Grid, IdentifyOptions};
 use pyo3::prelude::*;
@@ -21,7 +22,7 @@ fn grid(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Grid>> 
 
 /// Runs long work without the interpreter's lock. Ctrl-C and exceptions of the progress function stop
 /// it and are raised.
-fn interruptible<T: Send>(
+pub(crate) fn interruptible<T: Send>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(core::Progress) -> Result<T, Error> + Send,
@@ -85,19 +86,19 @@ impl HysteresisFit {
         from_vector(py, &self.fit.history)
     }
 
-    /// Whether the last step gained next to nothing; otherwise the step limit was reached.
+    /// How the fit ended: ``converged``, ``stalled`` or ``limit``.
     #[getter]
-    fn converged(&self) -> bool {
-        self.fit.converged
+    fn status(&self) -> &'static str {
+        self.fit.status.name()
     }
 
     fn __repr__(&self) -> String {
         format!(
-            "HysteresisFit({} deadzones, {} plays, rms {:.4e}, converged: {})",
+            "HysteresisFit({} deadzones, {} plays, rms {:.4e}, {})",
             self.fit.hysteresis.envelope().weights().len(),
             self.fit.hysteresis.plays().weights().len(),
             self.fit.rms,
-            self.fit.converged
+            self.fit.status.name()
         )
     }
 }
@@ -206,7 +207,8 @@ fn fit_hysteresis(
 /// True
 #[pyfunction]
 #[pyo3(signature = (record, *, taps = None, order = None, half_widths = None, thresholds = None,
-    delay = None, progress = None))]
+    reading = "one-sided", delay = None, robust = None, offset_knots = 1, progress = None))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
 fn identify(
     py: Python<'_>,
     record: &Record,
@@ -214,7 +216,10 @@ fn identify(
     order: Option<usize>,
     half_widths: Option<&Bound<'_, PyAny>>,
     thresholds: Option<&Bound<'_, PyAny>>,
+    reading: &str,
     delay: Option<usize>,
+    robust: Option<bool>,
+    offset_knots: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Model> {
     let options = IdentifyOptions {
@@ -222,12 +227,17 @@ fn identify(
         order,
         half_widths: grid("half_widths", half_widths)?,
         thresholds: grid("thresholds", thresholds)?,
+        reading: read_reading(reading)?,
         delay,
+        robust,
+        offset_knots,
     };
     let record = &record.record;
     let found = interruptible(py, progress, |report| core::identify(record, &options, report))?;
     let model = found.model.clone();
-    Ok(Model { model, identification: Some(Py::new(py, Identification { found })?) })
+    let refinement = Refinement { refinement: found.refinement.clone() };
+    let refinement = Some(Py::new(py, refinement)?);
+    Ok(Model { model, identification: Some(Py::new(py, Identification { found })?), refinement })
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

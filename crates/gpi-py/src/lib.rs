@@ -12,6 +12,7 @@ mod model;
 mod operators;
 mod plotting;
 mod record;
+mod refine;
 mod state_space;
 
 use pyo3::prelude::*;
@@ -28,5 +29,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     model::register(module)?;
     identification::register(module)?;
     identify::register(module)?;
+    refine::register(module)?;
     excitation::register(module)
 }

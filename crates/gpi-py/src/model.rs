@@ -3,10 +3,13 @@
 use crate::arrays::{from_matrix, from_signal, from_vector, signal, vector};
 use crate::errors::{parameter, to_python};
 use crate::identification::Identification;
+use crate::identify::interruptible;
 use crate::operators::{Gpi, read_state, write_state};
 use crate::record::{Record, names, units};
+use crate::refine::Refinement;
 use crate::state_space::StateSpace;
-use gpi_core::ModelState;
+use gpi_core::identify::residuals_from_fitted_start;
+use gpi_core::{Matrix, ModelState, SimulationError};
 use nalgebra::DVector;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -18,9 +21,19 @@ use pyo3::types::PyDict;
 pub(crate) struct Model {
     pub(crate) model: gpi_core::Model,
     pub(crate) identification: Option<Py<Identification>>,
+    pub(crate) refinement: Option<Py<Refinement>>,
 }
 
 impl Model {
+    fn residuals(&self, py: Python<'_>, record: &Record, fit_start: bool) -> PyResult<Vec<Matrix>> {
+        let (model, record) = (&self.model, &record.record);
+        if fit_start {
+            interruptible(py, None, |report| residuals_from_fitted_start(model, record, report))
+        } else {
+            model.residuals(record).map_err(to_python)
+        }
+    }
+
     /// A state as one vector: previous input and plays of every input, then x.
     fn write(state: &ModelState) -> Vec<f64> {
         let plays = state.hysteresis.iter().flat_map(write_state);
@@ -103,6 +116,12 @@ impl Model {
         self.identification.as_ref().map(|identification| identification.clone_ref(py))
     }
 
+    /// How the model was refined, and how sure its parameters are; None for a model that was loaded.
+    #[getter]
+    fn refinement(&self, py: Python<'_>) -> Option<Py<Refinement>> {
+        self.refinement.as_ref().map(|refinement| refinement.clone_ref(py))
+    }
+
     /// The output for u, shape (samples,) or (samples, inputs).
     ///
     /// The actuator is taken to have been raised from zero to the first sample once, and to have stood
@@ -159,20 +178,25 @@ impl Model {
     ///     Measured input and output.
     /// remove_mean : bool
     ///     Take the mean of each experiment's residual out first, for a sensor whose offset moved.
+    /// fit_start : bool
+    ///     Fit what was before the first sample of experiments that begin in motion (plays and state of
+    ///     G, nothing else) to the record first, as MATLAB's ``compare`` does.
     ///
     /// Returns
     /// -------
     /// dict
     ///     ``rms`` and ``max`` in the output's unit, ``nrmse`` (rms over span), ``fit_percent``
     ///     (100 (1 - |e| / |y - mean y|)).
-    #[pyo3(signature = (record, *, remove_mean = false))]
+    #[pyo3(signature = (record, *, remove_mean = false, fit_start = false))]
     fn error<'py>(
         &self,
         py: Python<'py>,
         record: &Record,
         remove_mean: bool,
+        fit_start: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let error = self.model.error(&record.record, remove_mean).map_err(to_python)?;
+        let residuals = self.residuals(py, record, fit_start)?;
+        let error = SimulationError::of(&record.record, &residuals, remove_mean);
         let result = PyDict::new(py);
         result.set_item("rms", error.rms)?;
         result.set_item("nrmse", error.nrmse)?;
@@ -181,9 +205,16 @@ impl Model {
         Ok(result)
     }
 
-    /// Measured minus simulated output of each experiment, each of shape (samples, outputs).
-    fn residual<'py>(&self, py: Python<'py>, record: &Record) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        let residuals = self.model.residuals(&record.record).map_err(to_python)?;
+    /// Measured minus simulated output of each experiment, each of shape (samples, outputs);
+    /// ``fit_start`` as in ``error``.
+    #[pyo3(signature = (record, *, fit_start = false))]
+    fn residual<'py>(
+        &self,
+        py: Python<'py>,
+        record: &Record,
+        fit_start: bool,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let residuals = self.residuals(py, record, fit_start)?;
         Ok(residuals.iter().map(|residual| from_matrix(py, residual)).collect())
     }
 
@@ -196,7 +227,7 @@ impl Model {
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         let model = gpi_core::Model::from_json(text).map_err(to_python)?;
-        Ok(Self { model, identification: None })
+        Ok(Self { model, identification: None, refinement: None })
     }
 
     /// Writes the model to a JSON file; a file of that name is replaced as a whole.

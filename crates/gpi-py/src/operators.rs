@@ -127,6 +127,13 @@ pub(crate) struct Deadzones {
     pub(crate) envelope: Envelope,
 }
 
+/// The reading of a name.
+pub(crate) fn read_reading(name: &str) -> PyResult<Reading> {
+    let readings = [Reading::OneSided, Reading::Directional];
+    let message = || parameter(format!("`reading` = {name}: must be one-sided or directional"));
+    readings.into_iter().find(|&known| reading_name(known) == name).ok_or_else(message)
+}
+
 fn reading_name(reading: Reading) -> &'static str {
     match reading {
         Reading::OneSided => "one-sided",
@@ -143,12 +150,7 @@ impl Deadzones {
         weights: &Bound<'_, PyAny>,
         reading: &str,
     ) -> PyResult<Self> {
-        let readings = [Reading::OneSided, Reading::Directional];
-        let Some(reading) = readings.into_iter().find(|&known| reading_name(known) == reading)
-        else {
-            let message = format!("`reading` = {reading}: must be one-sided or directional");
-            return Err(parameter(message));
-        };
+        let reading = read_reading(reading)?;
         let (eta, g) = (vector("thresholds", thresholds)?, vector("weights", weights)?);
         Ok(Self { envelope: Envelope::new(eta, g, reading).map_err(to_python)? })
     }

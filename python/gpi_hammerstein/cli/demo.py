@@ -10,7 +10,7 @@ from rich.markup import escape
 import gpi_hammerstein._native as native
 from gpi_hammerstein._native import Fir, Model, Record
 from gpi_hammerstein.cli import options
-from gpi_hammerstein.cli.identify import describe_model
+from gpi_hammerstein.cli.identification import describe_model
 from gpi_hammerstein.cli.output import (
     console,
     error_table,
@@ -46,7 +46,7 @@ def demo(out: options.Out = None, as_json: options.Json = False) -> None:
         **describe_model(model),
         "error": {
             "linear": {"train": linear_error(linear, train), "holdout": linear_error(linear, test)},
-            "identified": {"train": model.error(train), "holdout": model.error(test)},
+            "identified": {"train": model.error(train, fit_start=True), "holdout": model.error(test)},
         },
         "files": [],
     }
@@ -114,12 +114,12 @@ def linear_error(linear: Fir, record: Record) -> dict[str, float]:
 
 def draw_comparison(ax: "Axes", linear: Fir, model: Model, record: Record) -> None:
     """Draw both residuals on one pair of axes."""
-    from gpi_hammerstein import plot
+    from gpi_hammerstein.plot.style import BLUE, ORANGE
 
     t = np.arange(len(record.y[0])) / record.rate
     before = record.y[0][:, 0] - linear_output(linear, record)
-    ax.plot(t, before, color=plot.ORANGE, lw=0.8, label="linear alone")
-    ax.plot(t, model.residual(record)[0][:, 0], color=plot.BLUE, lw=0.8, label="with hysteresis")
+    ax.plot(t, before, color=ORANGE, lw=0.8, label="linear alone")
+    ax.plot(t, model.residual(record)[0][:, 0], color=BLUE, lw=0.8, label="with hysteresis")
     ax.set_xlabel("time [s]")
     ax.set_ylabel(f"residual of {record.output_names[0]} [{record.output_units[0]}]")
     ax.set_title("Another experiment of the same actuator")

@@ -2,24 +2,21 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 
 import gpi_hammerstein._native as native
 from gpi_hammerstein import files
-from gpi_hammerstein._native import Model, ParameterError, Record
+from gpi_hammerstein._native import ParameterError, Record
 from gpi_hammerstein.cli import options
+from gpi_hammerstein.cli.identification import describe_model, summarise
 from gpi_hammerstein.cli.output import (
     common_unit,
     console,
     describe_record,
-    error_table,
     print_json,
     progress_bar,
-    say_written,
     working,
     write_json,
 )
@@ -71,6 +68,26 @@ def identify(
         int | None,
         typer.Option(min=0, help="Makes G a gain with this delay, in samples.", rich_help_panel=MODEL),
     ] = None,
+    reading: Annotated[
+        Literal["one-sided", "directional"],
+        typer.Option(help="Deadzones: of u alone, or of its direction too.", rich_help_panel=MODEL),
+    ] = "one-sided",
+    offset_knots: Annotated[
+        int,
+        typer.Option(
+            min=1, help="Knots of each experiment's offset; 2 or more let it drift.", rich_help_panel=MODEL
+        ),
+    ] = 1,
+    robust: Annotated[
+        bool | None,
+        typer.Option(
+            "--robust/--no-robust",
+            help="Weigh outliers down; decided by the data unless given.",
+            rich_help_panel=MODEL,
+            show_default=False,
+        ),
+    ] = None,
+    fit_start: options.FitStart = False,
     remove_mean: options.RemoveMean = False,
     out: options.Out = None,
     as_json: options.Json = False,
@@ -98,22 +115,25 @@ def identify(
             order=order,
             half_widths=options.parse_numbers("half_widths", half_widths),
             thresholds=options.parse_numbers("thresholds", thresholds),
+            reading=reading,
             delay=delay,
+            robust=robust,
+            offset_knots=offset_knots,
             progress=progress,
         )
     if model.identification is not None:
         # What the fit could not use for want of a known past is no error of the model.
         train = raise_warmup(train, model.identification.warmups)
-    error = {
-        "train": model.error(train, remove_mean=remove_mean),
-        "holdout": None if test is None else model.error(test, remove_mean=remove_mean),
-    }
+    held_out = None if test is None else model.error(test, remove_mean=remove_mean, fit_start=fit_start)
+    # What was before the training data was part of the fit.
+    error = {"train": model.error(train, remove_mean=remove_mean, fit_start=True), "holdout": held_out}
     result = {
         "schema": "gpi-identification/1",
         "record": describe_record(recording, records),
         "holdout": how,
         **describe_model(model),
         "mean_removed": remove_mean,
+        "start_fitted": fit_start,
         "error": error,
         "files": [],
     }
@@ -121,7 +141,7 @@ def identify(
         from gpi_hammerstein.cli.pictures import write_pictures
 
         with files.staged(out) as folder, working("drawing"):
-            write_pictures(folder, model, train, test)
+            write_pictures(folder, model, train, test, fit_start=fit_start)
             files.save_model(model, folder / "model.json")
             result["files"] = sorted([*(file.name for file in folder.iterdir()), "identification.json"])
             write_json(result, folder / "identification.json")
@@ -176,53 +196,3 @@ def hold_out(
         raise ParameterError(f"`holdout` = {holdout}: the share must lie between 0 and 1")
     train, test = recording.record().split(1 - share)
     return train, test, f"the last {100 * share:g} % of every experiment in time"
-
-
-def describe_model(model: Model) -> dict[str, Any]:
-    """Return the part of a result that says what was fitted."""
-    found = model.identification
-    return {
-        "order": model.linear.order,
-        "poles": model.linear.poles,
-        "dc_gain": model.linear.dc_gain,
-        "half_widths": [gpi.plays.half_widths for gpi in model.hysteresis],
-        "weights": [gpi.plays.weights for gpi in model.hysteresis],
-        "thresholds": [gpi.envelope.thresholds for gpi in model.hysteresis],
-        "deadzone_weights": [gpi.envelope.weights for gpi in model.hysteresis],
-        "offsets": model.offsets,
-        "delay": found.delay if found else None,
-        "taps": min(found.rounds, key=lambda one: one["rms"])["taps"] if found and found.rounds else None,
-        "excited": found.supported_taps if found else None,
-        "rounds": found.rounds if found else [],
-        "notes": found.notes if found else [],
-    }
-
-
-def summarise(screen: Console, result: Mapping[str, Any], model: Model, unit: str, out: Path | None) -> None:
-    """Print what was found for people to read."""
-    record = result["record"]
-    screen.print(
-        f"{record['samples']} samples at {record['rate_hz']:g} Hz in {record['experiments']} experiment(s): "
-        + escape(f"{', '.join(record['inputs'])} -> {', '.join(record['outputs'])}")
-    )
-    for note in (*record["notes"], *result["notes"]):
-        screen.print(f"[yellow]note[/] {escape(note)}")
-    screen.print(
-        f"Linear part: order {result['order']}, largest pole {model.linear.spectral_radius:.4f}"
-        + ("" if result["taps"] is None else f", {result['taps']:g} taps")
-        + ("" if result["excited"] is None else f" (the input excites {result['excited']})")
-        + ("" if result["delay"] is None else f", a gain with a delay of {result['delay']} samples")
-    )
-    hysteresis = zip(model.input_names, result["half_widths"], result["thresholds"], strict=True)
-    for name, plays, zones in hysteresis:
-        screen.print(f"Hysteresis of {escape(name)}: {len(plays)} plays, {len(zones)} deadzones")
-    screen.print(f"Held out: {escape(result['holdout'])}")
-    mean = ", mean removed" if result["mean_removed"] else ""
-    screen.print(
-        error_table(
-            {"fitted": result["error"]["train"], "held out": result["error"]["holdout"]},
-            unit,
-            f"Simulation error{mean}",
-        )
-    )
-    say_written(screen, out, result["files"])

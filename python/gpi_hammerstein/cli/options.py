@@ -69,6 +69,13 @@ RemoveMean = Annotated[
     bool,
     typer.Option("--remove-mean", help="Leave a constant offset (a sensor's zero) out of the error."),
 ]
+FitStart = Annotated[
+    bool,
+    typer.Option(
+        "--fit-start",
+        help="Score held-out data from a fitted past (plays, state) where they begin in motion.",
+    ),
+]
 Out = Annotated[
     Path | None,
     typer.Option("--out", "-o", metavar="DIR", help="Folder for what is written.", show_default=False),

@@ -128,6 +128,11 @@ def error_table(rows: Mapping[str, Figures], unit: str = "", title: str = "Simul
     return table
 
 
+def mean_and_start(mean_removed: bool, start_fitted: bool) -> str:
+    """Return what a title says about the way an error was taken."""
+    return (", mean removed" if mean_removed else "") + (", start fitted" if start_fitted else "")
+
+
 def common_unit(record: Record) -> str:
     """Return the unit of the outputs when they share one."""
     units = set(record.output_units)

@@ -10,24 +10,32 @@ from numpy.typing import NDArray
 from gpi_hammerstein import plot
 from gpi_hammerstein._native import GpiError, Model, Record
 from gpi_hammerstein.cli.output import picture
+from gpi_hammerstein.plot.style import BLUE, label, shade_path
 
 # v-hat is worth a look while the noise that the inverse of G makes of the residual stays below this
 # fraction of the span of v.
 NOISE_SHARE = 0.05
 
 
-def write_pictures(folder: Path, model: Model, train: Record, test: Record | None) -> None:
-    """Draw fit, residual, loop, impulse response, frequency response and singular values."""
-    shown = train if test is None else test
-    picture(folder / "fit.png", partial(plot.fit, model, shown), 10.0)
-    picture(folder / "residual.png", partial(plot.residual, model, shown), 10.0, 3.5)
+def write_pictures(
+    folder: Path, model: Model, train: Record, test: Record | None, *, fit_start: bool = False
+) -> None:
+    """Draw fit, residual, loop, responses, singular values and the structures compared.
+
+    `fit_start` is for `test`; the start of `train` was part of the fit.
+    """
+    shown, fitted = (train, True) if test is None else (test, fit_start)
+    picture(folder / "fit.png", partial(plot.fit, model, shown, fit_start=fitted), 10.0)
+    picture(folder / "residual.png", partial(plot.residual, model, shown, fit_start=fitted), 10.0, 3.5)
     u = train.u[0]
     v_hat = intermediate_seen(model, train)
     picture(folder / "loop.png", partial(draw_loop, model=model, u=u, v_hat=v_hat), 6.0, 6.0)
-    picture(folder / "bode.png", partial(plot.bode, model.linear, model.rate))
+    picture(folder / "bode.png", partial(plot.bode, model.linear, model.rate, refinement=model.refinement))
     found = model.identification
     if found is None:
         return
+    if found.candidates:
+        picture(folder / "candidates.png", partial(plot.candidates, model))
     if found.fir is not None:
         picture(folder / "markov.png", partial(plot.markov, found.fir))
     if len(found.singular_values):
@@ -40,9 +48,13 @@ def draw_loop(ax: Axes, model: Model, u: NDArray[np.float64], v_hat: NDArray[np.
     if v_hat is not None:
         plot.loop(u[:, 0], v_hat, model, ax)
     else:
-        plot.loop(u[:, 0], model.intermediate(u)[:, 0], ax=ax)
-    ax.set_xlabel(plot.label(model.input_names[0], model.input_units[0]))
-    ax.set_ylabel(plot.label("intermediate signal v", model.output_units[0]))
+        v = model.intermediate(u)[:, 0]
+        plot.loop(u[:, 0], v, ax=ax)
+        if model.refinement is not None:
+            shade_path(ax, u[:, 0], v, model.refinement.loop_std(u)[:, 0], BLUE, model.output_units[0])
+            ax.legend(loc="upper left")
+    ax.set_xlabel(label(model.input_names[0], model.input_units[0]))
+    ax.set_ylabel(label("intermediate signal v", model.output_units[0]))
 
 
 def intermediate_seen(model: Model, record: Record) -> NDArray[np.float64] | None:
@@ -61,5 +73,5 @@ def intermediate_seen(model: Model, record: Record) -> NDArray[np.float64] | Non
         return None
     v_hat = np.full(len(record.y[0]), np.nan)
     v_hat[seen.valid] = seen.values[seen.valid]
-    noise = model.error(record)["rms"] * float(np.linalg.norm(inverse.taps))
+    noise = model.error(record, fit_start=True)["rms"] * float(np.linalg.norm(inverse.taps))
     return v_hat if noise < NOISE_SHARE * float(np.ptp(model.intermediate(record.u[0]))) else None

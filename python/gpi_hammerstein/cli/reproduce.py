@@ -123,9 +123,9 @@ def draw(found: Paper, folder: Path) -> None:
 
 def colours() -> tuple[str, ...]:
     """Return the colours of all pictures."""
-    from gpi_hammerstein import plot
+    from gpi_hammerstein.plot.style import CYCLE
 
-    return plot.CYCLE
+    return CYCLE
 
 
 def figure_3(ax: "Axes", found: Paper, reading: ReadingResult) -> None:

@@ -8,13 +8,14 @@ import polars as pl
 import typer
 
 from gpi_hammerstein import files
-from gpi_hammerstein._native import DataError, Model
+from gpi_hammerstein._native import DataError, Model, ParameterError, Record
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import (
     common_unit,
     console,
     describe_record,
     error_table,
+    mean_and_start,
     print_json,
     say_written,
     working,
@@ -37,6 +38,7 @@ def simulate(
     warmup: options.Warmup = None,
     experiments: options.Experiments = None,
     skip: Skip = 0.0,
+    fit_start: options.FitStart = False,
     remove_mean: options.RemoveMean = False,
     out: options.Out = None,
     as_json: options.Json = False,
@@ -60,14 +62,20 @@ def simulate(
     ).skip(skip)
     require_match(model, recording)
     record = recording.record() if recording.outputs else None
+    if fit_start and record is None:
+        raise ParameterError(
+            "`fit-start`: the record has no output column to fit to; name one (--output) or leave it out"
+        )
     with working("simulating"):
-        error = None if record is None else model.error(record, remove_mean=remove_mean)
-        simulated = simulated_table(model, recording) if out is not None else None
+        error = None if record is None else model.error(record, remove_mean=remove_mean, fit_start=fit_start)
+        start = record if fit_start else None
+        simulated = simulated_table(model, recording, start) if out is not None else None
     result = {
         "schema": "gpi-simulation/1",
         "model": str(model_file),
         "record": describe_record(recording, records),
         "mean_removed": remove_mean,
+        "start_fitted": fit_start,
         "skipped_s": skip,
         "error": error,
         "files": [],
@@ -85,8 +93,8 @@ def simulate(
     if record is None:
         screen.print("The record has no output column: nothing to compare with.")
     else:
-        mean = ", mean removed" if remove_mean else ""
-        screen.print(error_table({"record": error}, common_unit(record), f"Simulation error{mean}"))
+        title = "Simulation error" + mean_and_start(remove_mean, fit_start)
+        screen.print(error_table({"record": error}, common_unit(record), title))
     say_written(screen, out, ["simulated.csv"])
 
 
@@ -117,13 +125,21 @@ def require_match(model: Model, recording: Recording) -> None:
             )
 
 
-def simulated_table(model: Model, recording: Recording) -> pl.DataFrame:
-    """Return time and simulated outputs of all experiments."""
+def simulated_table(model: Model, recording: Recording, start: Record | None = None) -> pl.DataFrame:
+    """Return time and simulated outputs of all experiments.
+
+    `start` is the same experiments with their outputs, where what was before them shall be fitted.
+    """
+    fitted = None
+    if start is not None:
+        residuals = model.residual(start, fit_start=True)
+        fitted = [measured - residual for measured, residual in zip(start.y, residuals, strict=True)]
     several = len(model.output_names) > 1
     names = [f"y{index + 1}" for index in range(len(model.output_names))] if several else ["y"]
     frames = []
     for number, run in enumerate(recording.runs):
-        y = np.asarray(model.simulate(run.u)).reshape(len(run.u), -1)
+        own = model.simulate(run.u) if fitted is None else fitted[number]
+        y = np.asarray(own).reshape(len(run.u), -1)
         t = run.start + np.arange(len(run.u)) / recording.rate
         columns = {"t": t, **{name: y[:, index] for index, name in enumerate(names)}}
         if len(recording.runs) > 1:

@@ -1,5 +1,6 @@
 """`gpi validate`: what a model leaves unexplained on a record."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from gpi_hammerstein.cli.output import (
     console,
     describe_record,
     error_table,
+    mean_and_start,
     picture,
     print_json,
     say_written,
@@ -39,6 +41,7 @@ def validate(
     warmup: options.Warmup = None,
     experiments: options.Experiments = None,
     skip: Skip = 0.0,
+    fit_start: options.FitStart = False,
     remove_mean: options.RemoveMean = False,
     out: options.Out = None,
     as_json: options.Json = False,
@@ -62,13 +65,14 @@ def validate(
     require_match(model, recording)
     record = recording.record()
     with working("simulating"):
-        error = model.error(record, remove_mean=remove_mean)
-        residual = residual_figures(model, record)
+        error = model.error(record, remove_mean=remove_mean, fit_start=fit_start)
+        residual = residual_figures(model, record, fit_start=fit_start)
     result: dict[str, Any] = {
         "schema": "gpi-validation/1",
         "model": str(model_file),
         "record": describe_record(recording, records),
         "mean_removed": remove_mean,
+        "start_fitted": fit_start,
         "skipped_s": skip,
         "error": error,
         "residual": residual,
@@ -78,7 +82,8 @@ def validate(
         from gpi_hammerstein import plot
 
         with files.staged(out) as folder:
-            picture(folder / "residual.png", lambda ax: plot.residual(model, record, ax), 10.0, 3.5)
+            draw = partial(plot.residual, model, record, fit_start=fit_start)
+            picture(folder / "residual.png", draw, 10.0, 3.5)
             result["files"] = ["residual.png", "validation.json"]
             write_json(result, folder / "validation.json")
     if as_json:
@@ -87,8 +92,8 @@ def validate(
     screen = console()
     for note in recording.notes:
         screen.print(f"[yellow]note[/] {escape(note)}")
-    mean = ", mean removed" if remove_mean else ""
-    screen.print(error_table({"record": error}, common_unit(record), f"Simulation error{mean}"))
+    title = "Simulation error" + mean_and_start(remove_mean, fit_start)
+    screen.print(error_table({"record": error}, common_unit(record), title))
     screen.print(residual_table(residual))
     screen.print(
         "White noise alone has a lag-1 correlation of 0 and 25 % of its power in the lowest quarter of the "
@@ -97,14 +102,15 @@ def validate(
     say_written(screen, out, result["files"])
 
 
-def residual_figures(model: Model, record: Record) -> list[dict[str, Any]]:
+def residual_figures(model: Model, record: Record, *, fit_start: bool = False) -> list[dict[str, Any]]:
     """Return figures of the residual of every output, the mean of each experiment removed.
 
     ``rms`` is without the mean; ``lag1`` is the correlation of neighbouring samples; ``low_band`` the
     share of the power below a quarter of half the rate; ``noise_rms`` the rms of white noise that has
     the residual's power density above three quarters of half the rate.
     """
-    scored = [values[warmup:] for values, warmup in zip(model.residual(record), record.warmup, strict=True)]
+    residuals = model.residual(record, fit_start=fit_start)
+    scored = [values[warmup:] for values, warmup in zip(residuals, record.warmup, strict=True)]
     return [
         {"output": name, **channel_figures([values[:, index] for values in scored])}
         for index, name in enumerate(record.output_names)

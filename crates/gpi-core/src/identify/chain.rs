@@ -1,9 +1,14 @@
 //! The whole chain: excitation, start, rounds, model.
 
-use super::identification::{Identification, IdentifyOptions};
-use super::start::Start;
-use super::{Progress, report};
-use crate::linear::excitation_limit;
+use super::dynamic::{self, Taps};
+use super::identification::{Identification, IdentifyOptions, Round};
+use super::point::range;
+use super::preparation::Prepared;
+use super::quasi_static;
+use super::sensitivity::Parameters;
+use super::structure::Search;
+use super::{Grid, Progress, report};
+use crate::linear::{Fir, excitation_limit};
 use crate::{Error, Record};
 
 /// Identifies a model from a record.
@@ -36,8 +41,9 @@ pub fn identify(
     let longest =
         record.experiments().iter().map(|e| e.input.nrows() - e.warmup).max().unwrap_or(0);
     let affordable = (longest / (4 * inputs)).max(1);
-    let start = Start::new(record, options)?;
-    let sizes = start.point.channels.iter().map(|c| c.half_widths.len() + c.thresholds.len());
+    let grid = options.half_widths.clone().unwrap_or(Grid::Count(24));
+    let mut prepared = Prepared::new(record, channels(record, options, &grid)?)?;
+    let sizes = prepared.channels.iter().map(|c| c.half_widths.len() + c.slopes.len() - 1);
     let needed = sizes.sum::<usize>() + record.outputs().len();
     if record.scored() < needed {
         let purpose = "plays, deadzones and offsets".to_owned();
@@ -45,8 +51,7 @@ pub fn identify(
     }
     // With a gain and a delay nothing is left for more taps to tell.
     let taps = options.taps.unwrap_or(supported.min(affordable));
-    let quasi_static = options.delay.is_some() || taps <= 4;
-    if quasi_static {
+    if options.delay.is_some() || taps <= 4 {
         if let Some(order) = options.order {
             let requirement = format!(
                 "the input supports {} taps, which is a gain and a delay; leave the order out",
@@ -54,11 +59,87 @@ pub fn identify(
             );
             return Err(Error::parameter("order", order, requirement));
         }
-        start.quasi_static(options.delay, supported, progress)
-    } else {
-        let largest = (1200 / inputs).min(1024).min(supported).min(affordable);
-        let taps = options.taps.unwrap_or(largest.min(400));
-        let largest = if options.taps.is_some() { taps } else { largest };
-        start.dynamic(taps, largest, options.order, supported, progress)
+        let (points, rounds) = quasi_static::seeds(&prepared, options.delay, progress)?;
+        let mut search = Search::new(&prepared, options);
+        // A rich hysteresis hides a sample of delay; a simple one beside it may tell.
+        for point in &points {
+            search.climb(point, progress)?;
+        }
+        if options.delay.is_none() {
+            search.lag(progress)?;
+        }
+        let stages = (None, Vec::new(), 0, rounds);
+        return finish(&prepared, search, true, stages, supported, progress);
     }
+    let largest = (1200 / inputs).min(1024).min(supported).min(affordable);
+    let count = options.taps.unwrap_or(largest.min(400));
+    let mut taps = Taps { count, largest: options.taps.unwrap_or(largest) };
+    let seed = dynamic::seed(&mut prepared, &grid, &mut taps, options.order, progress)?;
+    let mut search = Search::new(&prepared, options);
+    search.climb(&seed.point, progress)?;
+    if options.order.is_none() {
+        let mut quiet = |_: &str, _: f64| true;
+        let mut dynamics = |driven: &Record, order: usize| {
+            dynamic::dynamics_of(driven, &mut taps, Some(order), &mut quiet)?.sections()
+        };
+        search.orders(&mut dynamics, progress)?;
+    }
+    let stages = (Some(seed.fir), seed.singular_values, seed.reflected, seed.rounds);
+    finish(&prepared, search, false, stages, supported, progress)
+}
+
+/// The hysteresis that the rounds start from: the identity on the given or usual grids.
+fn channels(
+    record: &Record,
+    options: &IdentifyOptions,
+    half_widths: &Grid,
+) -> Result<Vec<Parameters>, Error> {
+    let thresholds = options.thresholds.clone().unwrap_or(Grid::Count(10));
+    let channel = |input| {
+        let (low, high) = range(record, input);
+        let zones = thresholds.thresholds((low, high))?;
+        let plays = half_widths.half_widths(high - low)?;
+        Ok(Parameters::identity(options.reading, zones, plays))
+    };
+    (0..record.inputs().len()).map(channel).collect()
+}
+
+/// The best structure's model and what it rests on.
+fn finish(
+    prepared: &Prepared,
+    search: Search,
+    quasi_static: bool,
+    (fir, singular_values, reflected, rounds): (Option<Fir>, Vec<f64>, usize, Vec<Round>),
+    supported_taps: usize,
+    progress: Progress,
+) -> Result<Identification, Error> {
+    let Some((chosen, mut refined, candidates)) = search.finish() else {
+        return Err(Error::parameter("half_widths", "none", "at least one structure is tried"));
+    };
+    refined.drop_undetermined(prepared, progress)?;
+    let refinement = refined.finish(prepared, progress)?;
+    let mut notes = prepared.notes.clone();
+    let dynamics = &refinement.point.dynamics;
+    if quasi_static && supported_taps <= 4 {
+        let lag = if dynamics.order() > 0 { " and a lag" } else { "" };
+        notes.push(format!(
+            "the input excites {supported_taps} directions per channel only, a gain and a delay: the \
+             linear part is a delay of {} samples{lag}",
+            dynamics.delay
+        ));
+    }
+    Ok(Identification {
+        model: refinement.point.to_model(prepared.given, &prepared.record, &prepared.means)?,
+        candidates,
+        chosen,
+        fir,
+        singular_values,
+        reflected,
+        supported_taps,
+        delay: quasi_static.then_some(dynamics.delay),
+        rounds,
+        warmups: prepared.record.experiments().iter().map(|e| e.warmup).collect(),
+        notes,
+        refinement,
+    })
 }

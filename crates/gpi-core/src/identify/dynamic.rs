@@ -1,114 +1,117 @@
 //! Hysteresis and linear dynamics in turn, until nothing is gained.
 
+use super::Grid;
 use super::dynamics::{self, Dynamics};
-use super::hysteresis::fit;
-use super::identification::{Identification, Round};
-use super::linearization::Freedom;
-use super::sensitivity::Derivatives;
-use super::start::{Start, rescale};
+use super::identification::Round;
+use super::levenberg_marquardt::fit;
+use super::point::{DynamicsFreedom, Point};
+use super::preparation::{Prepared, rescale};
+use super::refine::{RefineOptions, settings};
+use super::sensitivity::Parameters;
 use super::{Progress, report};
-use crate::linear;
+use crate::linear::{self, Fir};
 use crate::{Error, Record};
 
 /// Regularization of the FIR estimates, see [`linear::estimate`].
 const RIDGE: f64 = 3e-2;
 
-impl Start<'_> {
-    /// Hysteresis and dynamics in turn.
-    pub(super) fn dynamic(
-        mut self,
-        taps: usize,
-        largest: usize,
-        order: Option<usize>,
-        supported: usize,
-        progress: Progress,
-    ) -> Result<Identification, Error> {
-        const ROUNDS: usize = 5;
-        /// Further rounds in which the thresholds move too.
-        const POLISH: usize = 3;
-        /// Levenberg-Marquardt steps a round.
-        const STEPS: usize = 6;
-        /// A round that lowers the rms by less than this fraction is the last one.
-        const GAIN: f64 = 5e-3;
-        let mut taps = taps;
-        let mut current = dynamics_of(&self.record, &mut taps, largest, order, progress)?;
-        let fir = linear::estimate(&self.record, taps, 0.0)?;
-        let mut rounds = Vec::new();
-        let mut point = self.point.clone();
-        let linear_alone = self.free_run(&point, &current.refit.system)?.0;
-        let mut best = (linear_alone, point.clone(), current.clone());
-        let mut polish = false;
-        for round in 0..ROUNDS + POLISH {
-            report(progress, "rounds", round as f64 / (ROUNDS + POLISH) as f64)?;
-            polish |= round == ROUNDS;
-            // While placing anew, a round may be worse before the next is better; the polish goes on
-            // from the best.
-            if polish {
-                (point, current) = (best.1.clone(), best.2.clone());
-            }
-            rescale(&mut point, &mut current.refit.system)?;
-            if !polish {
-                self.place(&mut point)?;
-            }
-            let numerator = current.refit.system.order() * self.record.outputs().len() <= 24;
-            let derivatives = Derivatives { thresholds: polish, starts: self.unknown_past };
-            let freedom = Freedom { derivatives, numerator };
-            let linear = &current.refit.system;
-            point = fit(point, linear, &self.record, freedom, STEPS, progress)?.point;
-            if point.channels.iter().any(|c| c.weights.iter().all(|&weight| weight == 0.0)) {
-                // y does not follow this input: there is no v to go on from.
-                break;
-            }
-            current = dynamics_of(&self.driven(&point)?, &mut taps, largest, order, progress)?;
-            let rms = self.free_run(&point, &current.refit.system)?.0;
-            rounds.push(Round { rms, order: current.refit.system.order(), taps });
-            let least = best.0;
-            if rms < least {
-                best = (rms, point.clone(), current.clone());
-            }
-            let stalled = rms > (1.0 - GAIN) * least;
-            if stalled && round == 0 {
-                self.notes.push(format!(
-                    "hysteresis at the input hardly helps: training error {rms:.4e} with it, \
-                     {least:.4e} without"
-                ));
-            }
-            if stalled && (polish || round == 0) {
-                break;
-            }
-            polish |= stalled;
+/// Taps of the FIR estimates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Taps {
+    pub count: usize,
+    /// As many as the record can afford, should the slowest pole need them.
+    pub largest: usize,
+}
+
+/// Where the joint refinement starts from.
+pub(super) struct Seed {
+    pub point: Point,
+    /// The paper's first stage, u to y.
+    pub fir: Fir,
+    /// ERA's singular values in the best round.
+    pub singular_values: Vec<f64>,
+    pub reflected: usize,
+    pub rounds: Vec<Round>,
+}
+
+/// Hysteresis and dynamics in turn.
+pub(super) fn seed(
+    prepared: &mut Prepared,
+    half_widths: &Grid,
+    taps: &mut Taps,
+    order: Option<usize>,
+    progress: Progress,
+) -> Result<Seed, Error> {
+    const ROUNDS: usize = 4;
+    /// Levenberg-Marquardt steps a round.
+    const STEPS: usize = 7;
+    /// A round that lowers the rms by less than this fraction is the last one.
+    const GAIN: f64 = 5e-3;
+    let mut current = dynamics_of(&prepared.record, taps, order, progress)?;
+    let fir = linear::estimate(&prepared.record, taps.count, 0.0)?;
+    let mut rounds = Vec::new();
+    let mut point = prepared.point(current.sections()?);
+    let linear_alone = prepared.free_run(&mut point)?;
+    let mut options = settings(prepared, &RefineOptions::default(), STEPS);
+    options.freedom.identity = false;
+    // The weights need not make up for an error of G's zeros.
+    options.freedom.dynamics = DynamicsFreedom::Numerator;
+    options.gain = 1e-4;
+    rescale(&mut point);
+    let mut best = (linear_alone, point.clone(), current.clone());
+    for round in 0..ROUNDS {
+        report(progress, "rounds", round as f64 / ROUNDS as f64)?;
+        if round > 0 {
+            current = dynamics_of(&prepared.driven(&point)?, taps, order, progress)?;
+            point.replace_dynamics(current.sections()?);
         }
-        let (_, mut point, dynamics) = best;
-        let mut linear = dynamics.refit.system;
-        rescale(&mut point, &mut linear)?;
-        if dynamics.reflected > 0 {
-            self.notes.push(format!(
-                "{} poles of the realization were unstable and reflected into the unit circle",
-                dynamics.reflected
+        rescale(&mut point);
+        prepared.place(&mut point, half_widths)?;
+        let fitted = fit(point, &prepared.record, &options, "hysteresis", progress)?;
+        point = fitted.point;
+        let rms = (fitted.linearization.cost / prepared.values()).sqrt();
+        rounds.push(Round { rms, order: current.refit.system.order(), taps: taps.count });
+        let least = best.0;
+        if rms < least {
+            best = (rms, point.clone(), current.clone());
+        }
+        let stalled = rms > (1.0 - GAIN) * least;
+        if stalled && round == 0 {
+            prepared.notes.push(format!(
+                "hysteresis at the input hardly helps: training error {rms:.4e} with it, \
+                 {least:.4e} without"
             ));
         }
-        let stages = (Some(fir), dynamics.singular_values, dynamics.reflected);
-        let offsets = self.free_run(&point, &linear)?.1;
-        self.finish(point, linear, &offsets, stages, supported, None, rounds)
+        let silent = |c: &Parameters| c.weights.iter().all(|&weight| weight == 0.0);
+        if stalled || point.channels.iter().any(silent) {
+            // In the latter case y does not follow an input: there is no v to go on from.
+            break;
+        }
     }
+    let (_, point, Dynamics { singular_values, reflected, .. }) = best;
+    if reflected > 0 {
+        prepared.notes.push(format!(
+            "{reflected} poles of the realization were unstable and reflected into the unit circle"
+        ));
+    }
+    Ok(Seed { point, fir, singular_values, reflected, rounds })
 }
 
 /// G of a record whose input is v, with as many taps as its slowest pole needs.
-fn dynamics_of(
+pub(super) fn dynamics_of(
     record: &Record,
-    taps: &mut usize,
-    largest: usize,
+    taps: &mut Taps,
     order: Option<usize>,
     progress: Progress,
 ) -> Result<Dynamics, Error> {
     let mut check = || report(progress, "dynamics", 0.0);
-    let found = dynamics::estimate(record, *taps, RIDGE, order, &mut check)?;
+    let found = dynamics::estimate(record, taps.count, RIDGE, order, &mut check)?;
     // taps until the slowest pole has decayed to one percent
     let radius = found.refit.system.spectral_radius()?;
     let needed = (0.01_f64.ln() / radius.ln()) as usize;
-    if needed > *taps + *taps / 5 && *taps < largest {
-        *taps = needed.min(largest);
-        return dynamics::estimate(record, *taps, RIDGE, order, &mut check);
+    if needed > taps.count + taps.count / 5 && taps.count < taps.largest {
+        taps.count = needed.min(taps.largest);
+        return dynamics::estimate(record, taps.count, RIDGE, order, &mut check);
     }
     Ok(found)
 }

@@ -1,6 +1,6 @@
 //! The linear dynamics from their own input v to y.
 
-use crate::linear::{self, Hankel, NormalEquations, StateSpace, bounded};
+use crate::linear::{self, Hankel, NormalEquations, Sections, StateSpace, bounded};
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::DVector;
 
@@ -11,6 +11,13 @@ pub(super) struct Dynamics {
     pub singular_values: Vec<f64>,
     pub reflected: usize,
     pub refit: Refit,
+}
+
+impl Dynamics {
+    /// G in the form that is refined.
+    pub(super) fn sections(&self) -> Result<Sections, Error> {
+        Sections::from_state_space(&self.refit.system, 0)
+    }
 }
 
 /// C, D, offsets and free responses fitted to y with the poles kept.
@@ -113,9 +120,12 @@ pub(super) fn refit(record: &Record, system: StateSpace) -> Result<Refit, Error>
             start += rows;
         }
     }
-    let free = DVector::from_element(unknowns, f64::NEG_INFINITY);
+    let free = DVector::from_element(unknowns, f64::INFINITY);
     let solutions: Vec<DVector<f64>> = (0..outputs)
-        .map(|output| bounded(&equations.gram, &equations.rhs.column(output).into_owned(), &free))
+        .map(|output| {
+            let rhs = equations.rhs.column(output).into_owned();
+            bounded(&equations.gram, &rhs, &-&free, &free)
+        })
         .collect();
     let x = Matrix::from_columns(&solutions);
     let squares = equations.residual_squares(&x);

@@ -1,89 +1,16 @@
 //! The hysteresis fitted behind given dynamics.
 
-use super::linearization::{Freedom, Linearization, Point};
+use super::levenberg_marquardt::{FitOptions, Status, fit};
+use super::linearization::Weighting;
+use super::point::{DynamicsFreedom, Freedom, Past, Point, range};
 use super::sensitivity::{Derivatives, Parameters};
-use super::{Grid, Progress, report};
-use crate::linear::StateSpace;
+use super::{Grid, Progress};
+use crate::linear::Sections;
+use crate::operators::Reading;
 use crate::{Channel, Error, Experiment, Hysteresis, Matrix, Record};
+use nalgebra::DVector;
 
-/// How a fit went: where it ended and how it got there.
-pub(super) struct Fitted {
-    pub point: Point,
-    /// Sum of squares before every accepted step, then at the end.
-    pub history: Vec<f64>,
-    pub converged: bool,
-}
-
-/// Fits the weights (non-negative), slopes and whatever else is free to y, by Levenberg-Marquardt with
-/// the weights solved for exactly at every point.
-pub(super) fn fit(
-    point: Point,
-    linear: &StateSpace,
-    record: &Record,
-    freedom: Freedom,
-    steps: usize,
-    progress: Progress,
-) -> Result<Fitted, Error> {
-    /// An accepted step that gains less than this fraction of the cost is the last one.
-    const GAIN: f64 = 1e-4;
-    const LARGEST_DAMPING: f64 = 1e6;
-    let ranges: Vec<_> = (0..record.inputs().len()).map(|input| range(record, input)).collect();
-    let mut point = point;
-    let mut linearize = |point: &Point, done: f64| {
-        let mut check = || report(progress, "hysteresis", done);
-        Linearization::new(point, linear, record, freedom, &mut check)
-    };
-    let mut current = linearize(&point, 0.0)?;
-    let nonlinear =
-        freedom.derivatives.starts || point.channels.iter().any(|c| !c.slopes.is_empty());
-    let mut history = vec![current.cost];
-    let mut damping = 1e-3;
-    let mut converged = !nonlinear;
-    for step in 0..steps {
-        // Where not even a short step along the gradient helps, nothing is left to gain.
-        converged |= damping > LARGEST_DAMPING;
-        if converged {
-            break;
-        }
-        let done = step as f64 / steps as f64;
-        let trial = clamp_starts(current.step(&point, damping, &ranges), record);
-        let linearization = linearize(&trial, done)?;
-        if linearization.cost < current.cost {
-            converged = linearization.cost > (1.0 - GAIN) * current.cost;
-            (point, current) = (trial, linearization);
-            history.push(current.cost);
-            damping = (damping / 10.0_f64).max(1e-9);
-        } else {
-            damping *= 10.0;
-        }
-    }
-    Ok(Fitted { point: current.with_best_weights(&point), history, converged })
-}
-
-/// Smallest and largest input of all experiments.
-pub(super) fn range(record: &Record, input: usize) -> (f64, f64) {
-    let columns = record.experiments().iter().map(|e| e.input.column(input));
-    columns.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), column| {
-        (low.min(column.min()), high.max(column.max()))
-    })
-}
-
-/// Play i can only have been within its half-width of z; a hair inside, since a play that slides at
-/// once forgets its start.
-fn clamp_starts(mut point: Point, record: &Record) -> Point {
-    const INSIDE: f64 = 1.0 - 1e-9;
-    for (experiment, starts) in record.experiments().iter().zip(&mut point.starts) {
-        for (input, plays) in starts.iter_mut().enumerate() {
-            let z = point.channels[input].envelope(experiment.input[(0, input)]);
-            for (start, r) in plays.iter_mut().zip(&point.channels[input].half_widths) {
-                *start = start.clamp(z - INSIDE * r, z + INSIDE * r);
-            }
-        }
-    }
-    point
-}
-
-/// The first sample from which no play remembers its start: u has spanned twice the widest half-width.
+/// The first sample from which no play remembers its start: z has spanned twice the widest half-width.
 pub(super) fn forgets_at(input: impl Iterator<Item = f64>, widest: f64) -> Option<usize> {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for (k, value) in input.enumerate() {
@@ -108,8 +35,8 @@ pub struct HysteresisFit {
     pub rms: f64,
     /// Root mean square error before every accepted step, then at the end.
     pub history: Vec<f64>,
-    /// Whether the last step gained next to nothing; otherwise the step limit was reached.
-    pub converged: bool,
+    /// How the fit ended.
+    pub status: Status,
 }
 
 /// Fits envelope and plays, both at once, to an input u and an intermediate signal v.
@@ -152,7 +79,8 @@ pub fn fit_hysteresis(
     let record = Record::new(vec![run], 1.0, channel("u"), channel("v"), vec![])?;
     record.require_moving()?;
     let (low, high) = range(&record, 0);
-    let parameters = Parameters::identity(
+    let mut parameters = Parameters::identity(
+        Reading::OneSided,
         thresholds.thresholds((low, high))?,
         half_widths.half_widths(high - low)?,
     );
@@ -165,31 +93,40 @@ pub fn fit_hysteresis(
         );
         return Err(Error::TooFewSamples { samples: u.len(), needed, purpose });
     }
-    let starts = vec![vec![vec![parameters.envelope(u[0]); parameters.half_widths.len()]]];
-    let mut point = Point { channels: vec![parameters], starts };
+    let plays = Some(vec![vec![0.0; parameters.half_widths.len()]]);
     // The weights start at the scale of v over u, whatever the units.
     let experiment = &record.experiments()[0];
     let gain = (experiment.output.variance() / experiment.input.variance()).sqrt();
-    point.channels[0].weights[0] *= gain;
-    let identity = StateSpace::delayed_gain(&Matrix::from_element(1, 1, 1.0), 0);
-    let freedom =
-        Freedom { derivatives: Derivatives { thresholds: false, starts: true }, numerator: false };
-    let fitted = fit(point, &identity, &record, freedom, 60, progress)?;
+    parameters.weights[0] *= gain;
+    let point = Point {
+        channels: vec![parameters],
+        dynamics: Sections::delayed_gain(&Matrix::from_element(1, 1, 1.0), 0),
+        pasts: vec![Past { plays, moving: true, state: DVector::zeros(0) }],
+        offsets: vec![Matrix::from_element(1, 1, experiment.output.mean())],
+    };
+    let freedom = Freedom {
+        weights: true,
+        derivatives: Derivatives { starts: true, ..Derivatives::default() },
+        identity: false,
+        dynamics: DynamicsFreedom::Nothing,
+    };
+    let options = FitOptions { freedom, weighting: Weighting::equal(1), steps: 60, gain: 1e-4 };
+    let fitted = fit(point, &record, &options, "hysteresis", progress)?;
     let channel = &fitted.point.channels[0];
-    let start = &fitted.point.starts[0][0];
-    let mut simulated = u.to_vec();
-    channel.apply(start, &mut simulated);
-    let errors: Vec<f64> = v.iter().zip(&simulated).map(|(v, fitted)| v - fitted).collect();
-    let samples = errors.len() as f64;
-    let offset = errors.iter().sum::<f64>() / samples;
-    let squares: f64 = errors.iter().map(|error| (error - offset).powi(2)).sum();
-    let plays = channel.half_widths.iter().zip(&channel.weights).zip(start);
+    let z = channel.envelope(0.0, u[0]);
+    let sides = fitted.point.pasts[0].plays.iter().flatten().flatten();
+    let samples = u.len() as f64;
+    let rms = |cost: f64| (cost / samples).sqrt();
+    let plays = channel.half_widths.iter().zip(&channel.weights).zip(sides);
     Ok(HysteresisFit {
         hysteresis: channel.to_operator()?,
-        offset,
-        start: plays.filter(|((r, p), _)| **r == 0.0 || **p != 0.0).map(|(_, f)| *f).collect(),
-        rms: (squares / samples).sqrt(),
-        history: fitted.history.iter().map(|cost| (cost / samples).sqrt()).collect(),
-        converged: fitted.converged,
+        offset: fitted.point.offsets[0][0],
+        start: plays
+            .filter(|((r, p), _)| **r == 0.0 || **p != 0.0)
+            .map(|((r, _), side)| z + side * r)
+            .collect(),
+        rms: rms(fitted.linearization.cost),
+        history: fitted.history.iter().map(|&cost| rms(cost)).collect(),
+        status: fitted.status,
     })
 }

@@ -1,8 +1,11 @@
 //! What is asked of an identification, and what it answers.
 
 use super::Grid;
+use super::refine::Refinement;
+use super::structure::Candidate;
 use crate::Model;
 use crate::linear::Fir;
+use crate::operators::Reading;
 
 /// What [`identify`](super::identify) chooses (`None`) and what is given.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -11,12 +14,18 @@ pub struct IdentifyOptions {
     pub taps: Option<usize>,
     /// Order of the linear dynamics.
     pub order: Option<usize>,
-    /// Half-widths of the plays, in the unit of the input.
+    /// Plays: how many, placed by the data, or their half-widths in the unit of the input, kept.
     pub half_widths: Option<Grid>,
-    /// Thresholds of the deadzones, in the unit of the input.
+    /// Deadzones: how many, placed by the data, or their thresholds in the unit of the input, kept.
     pub thresholds: Option<Grid>,
+    /// How the deadzones are read.
+    pub reading: Reading,
     /// Restricts the linear part to a gain with a delay of this many samples.
     pub delay: Option<usize>,
+    /// As in [`RefineOptions`](super::RefineOptions).
+    pub robust: Option<bool>,
+    /// As in [`RefineOptions`](super::RefineOptions).
+    pub offset_knots: usize,
 }
 
 /// One pass of hysteresis and dynamics.
@@ -33,8 +42,14 @@ pub struct Round {
 /// A model and what it rests on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identification {
-    /// The model, in its best round.
+    /// The refined model.
     pub model: Model,
+    /// How it was refined, and how sure its parameters are.
+    pub refinement: Refinement,
+    /// The structures that were compared, in the order they were tried.
+    pub candidates: Vec<Candidate>,
+    /// Which of them was chosen.
+    pub chosen: usize,
     /// The paper's first stage, u to y; `None` where the input excites no more than gain and delay.
     pub fir: Option<Fir>,
     /// Singular values of ERA's Hankel matrix in the best round.

@@ -8,21 +8,42 @@
 //!
 //! Everything is fitted and chosen on the record that is given.
 
+mod bands;
 mod chain;
+mod colour;
 mod dynamic;
 mod dynamics;
+mod fit_start;
+mod free_run;
 mod grid;
 mod hysteresis;
 mod identification;
+mod levenberg_marquardt;
 mod linearization;
+mod names;
+mod noise_floor;
+mod outliers;
+mod point;
+mod preparation;
 mod quasi_static;
+mod refine;
+mod sensitivities;
 mod sensitivity;
-mod start;
+mod stream;
+mod structure;
+mod uncertainty;
 
+pub use bands::{PoleDeviations, ResponseDeviation};
 pub use chain::identify;
+pub use fit_start::residuals_from_fitted_start;
 pub use grid::Grid;
 pub use hysteresis::{HysteresisFit, fit_hysteresis};
 pub use identification::{Identification, IdentifyOptions, Round};
+pub use levenberg_marquardt::Status;
+pub use noise_floor::{NoiseFloor, NoiseMethod};
+pub use refine::{Parameter, RefineOptions, Refinement, refine};
+pub use sensitivities::{Sensitivities, sensitivities};
+pub use structure::Candidate;
 
 /// Called with the stage's name and the fraction done (0 to 1); `false` asks to stop, which ends the
 /// work with [`Error::Interrupted`](crate::Error::Interrupted).

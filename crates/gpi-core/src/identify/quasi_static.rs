@@ -1,57 +1,47 @@
 //! Hysteresis behind a gain with a delay, where the input excites no more.
 
-use super::hysteresis::fit;
-use super::identification::{Identification, Round};
-use super::linearization::{Freedom, Point};
-use super::sensitivity::Derivatives;
-use super::start::{Start, rescale};
+use super::identification::Round;
+use super::levenberg_marquardt::fit;
+use super::point::{DynamicsFreedom, Point};
+use super::preparation::{Prepared, rescale};
+use super::refine::{RefineOptions, settings};
 use super::{Progress, report};
-use crate::linear::{self, StateSpace};
-use crate::{Error, Matrix};
+use crate::Error;
+use crate::linear::{self, Sections};
 
-impl Start<'_> {
-    /// The linear part is a gain of plus or minus one with the delay that fits best.
-    pub(super) fn quasi_static(
-        mut self,
-        delay: Option<usize>,
-        supported: usize,
-        progress: Progress,
-    ) -> Result<Identification, Error> {
-        const LONGEST_DELAY: usize = 7;
-        /// As many states: a longer delay is better cut out of the record.
-        const LONGEST_GIVEN: usize = 500;
-        if let Some(delay) = delay.filter(|&delay| delay > LONGEST_GIVEN) {
-            let requirement = format!("at most {LONGEST_GIVEN} samples; shift the output instead");
-            return Err(Error::parameter("delay", delay, requirement));
-        }
-        let gain = linear::estimate(&self.record, 1, 0.0)?.markov.remove(0);
-        let delays = delay.map_or(0..=LONGEST_DELAY, |delay| delay..=delay);
-        let derivatives = Derivatives { thresholds: false, starts: self.unknown_past };
-        let freedom = Freedom { derivatives, numerator: false };
-        let mut rounds = Vec::new();
-        let mut best: Option<(usize, f64, Point, StateSpace, Matrix)> = None;
-        for delay in delays {
-            report(progress, "delay", delay as f64 / (LONGEST_DELAY + 1) as f64)?;
-            let mut linear = StateSpace::delayed_gain(&gain, delay);
-            let mut point = self.point.clone();
-            rescale(&mut point, &mut linear)?;
-            let fitted = fit(point, &linear, &self.record, freedom, 15, progress)?;
-            let (rms, offsets) = self.free_run(&fitted.point, &linear)?;
-            rounds.push(Round { rms, order: linear.order(), taps: delay + 1 });
-            if best.as_ref().is_none_or(|(_, least, ..)| rms < *least) {
-                best = Some((delay, rms, fitted.point, linear, offsets));
-            }
-        }
-        let Some((delay, _, point, linear, offsets)) = best else {
-            return Err(Error::parameter("delay", "none", "at least one delay is tried"));
-        };
-        if supported <= 4 {
-            self.notes.push(format!(
-                "the input excites {supported} directions per channel only, a gain and a delay: the \
-                 linear part is a delay of {delay} samples"
-            ));
-        }
-        let none = (None, Vec::new(), 0);
-        self.finish(point, linear, &offsets, none, supported, Some(delay), rounds)
+/// The linear part is a gain of plus or minus one with the delay that fits best, and with one sample
+/// less and more.
+pub(super) fn seeds(
+    prepared: &Prepared,
+    delay: Option<usize>,
+    progress: Progress,
+) -> Result<(Vec<Point>, Vec<Round>), Error> {
+    const LONGEST_DELAY: usize = 7;
+    /// As many states: a longer delay is better cut out of the record.
+    const LONGEST_GIVEN: usize = 500;
+    if let Some(delay) = delay.filter(|&delay| delay > LONGEST_GIVEN) {
+        let requirement = format!("at most {LONGEST_GIVEN} samples; shift the output instead");
+        return Err(Error::parameter("delay", delay, requirement));
     }
+    let gain = linear::estimate(&prepared.record, 1, 0.0)?.markov.remove(0);
+    let delays = delay.map_or(0..=LONGEST_DELAY, |delay| delay..=delay);
+    let mut options = settings(prepared, &RefineOptions::default(), 15);
+    options.freedom.identity = false;
+    options.freedom.dynamics = DynamicsFreedom::Nothing;
+    options.gain = 1e-4;
+    let mut rounds = Vec::new();
+    let mut fits: Vec<Point> = Vec::new();
+    for delay in delays {
+        report(progress, "delay", delay as f64 / (LONGEST_DELAY + 1) as f64)?;
+        let mut point = prepared.point(Sections::delayed_gain(&gain, delay));
+        rescale(&mut point);
+        let fitted = fit(point, &prepared.record, &options, "hysteresis", progress)?;
+        let rms = (fitted.linearization.cost / prepared.values()).sqrt();
+        rounds.push(Round { rms, order: delay, taps: delay + 1 });
+        fits.push(fitted.point);
+    }
+    let rms = |place: &usize| rounds[*place].rms;
+    let best = (0..fits.len()).min_by(|i, j| rms(i).total_cmp(&rms(j))).unwrap_or(0);
+    let beside = fits.drain(best.saturating_sub(1)..(best + 2).min(fits.len())).collect();
+    Ok((beside, rounds))
 }

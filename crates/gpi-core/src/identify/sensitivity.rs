@@ -3,11 +3,12 @@
 use crate::Hysteresis;
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading, play};
 
-/// Parameters of one hysteresis with one-sided deadzones: `z = u + sum_j g_j Z_{eta_j}(u)`, then plays.
+/// Parameters of one hysteresis: `z = sum_j g_j Z_{eta_j}(u)`, then plays.
 ///
-/// The weight of the identity is 1, which fixes the scale between envelope and plays.
+/// The first threshold is 0, whose one-sided deadzone is the identity; the first half-width is 0 too.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Parameters {
+    pub reading: Reading,
     pub thresholds: Vec<f64>,
     pub slopes: Vec<f64>,
     pub half_widths: Vec<f64>,
@@ -15,43 +16,66 @@ pub(super) struct Parameters {
 }
 
 impl Parameters {
-    /// The identity v = u on the given grid; `half_widths[0]` is 0.
-    pub(super) fn identity(thresholds: Vec<f64>, half_widths: Vec<f64>) -> Self {
-        let slopes = vec![0.0; thresholds.len()];
-        let mut weights = vec![0.0; half_widths.len()];
-        weights[0] = 1.0;
-        Self { thresholds, slopes, half_widths, weights }
+    /// v = Z_0(u) on the given grid: the identity for one-sided deadzones.
+    pub(super) fn identity(
+        reading: Reading,
+        mut thresholds: Vec<f64>,
+        half_widths: Vec<f64>,
+    ) -> Self {
+        thresholds.insert(0, 0.0);
+        let first = |count: usize| {
+            let mut values = vec![0.0; count];
+            values[0] = 1.0;
+            values
+        };
+        let (slopes, weights) = (first(thresholds.len()), first(half_widths.len()));
+        Self { reading, thresholds, slopes, half_widths, weights }
+    }
+
+    /// The parameters of an operator; the identity and the play of half-width zero are added where
+    /// they are missing.
+    pub(super) fn from_operator(hysteresis: &Hysteresis) -> Self {
+        let with_zero = |places: &[f64], values: &[f64]| {
+            let mut pairs: Vec<_> =
+                places.iter().copied().zip(values.iter().copied()).filter(|p| p.0 != 0.0).collect();
+            let at_zero = places.iter().zip(values).filter(|p| *p.0 == 0.0).map(|p| p.1).sum();
+            pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+            pairs.insert(0, (0.0, at_zero));
+            pairs.into_iter().unzip()
+        };
+        let (envelope, plays) = (hysteresis.envelope(), hysteresis.plays());
+        let (thresholds, slopes) = with_zero(envelope.thresholds(), envelope.weights());
+        let (half_widths, weights) = with_zero(plays.half_widths(), plays.weights());
+        Self { reading: envelope.reading(), thresholds, slopes, half_widths, weights }
     }
 
     /// z for one sample of u.
-    pub(super) fn envelope(&self, u: f64) -> f64 {
+    pub(super) fn envelope(&self, previous: f64, u: f64) -> f64 {
         let zones = self.thresholds.iter().zip(&self.slopes);
-        u + zones.map(|(&threshold, slope)| slope * zone(threshold, u)).sum::<f64>()
+        zones.map(|(&eta, slope)| slope * self.reading.zone(eta, previous, u)).sum()
     }
 
     /// Smallest and largest z of samples of u.
     pub(super) fn envelope_range(&self, u: impl Iterator<Item = f64>) -> (f64, f64) {
-        u.map(|value| self.envelope(value))
+        let mut previous = 0.0;
+        u.map(|value| self.envelope(std::mem::replace(&mut previous, value), value))
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)))
     }
 
     /// The operator, without plays and deadzones of weight zero.
     pub(super) fn to_operator(&self) -> Result<Hysteresis, crate::Error> {
-        let zones = self.thresholds.iter().zip(&self.slopes).filter(|(_, slope)| **slope != 0.0);
-        let (mut thresholds, mut slopes): (Vec<f64>, Vec<f64>) = zones.unzip();
-        let place = thresholds.partition_point(|&threshold| threshold < 0.0);
-        thresholds.insert(place, 0.0);
-        slopes.insert(place, 1.0);
+        let zones = self.thresholds.iter().copied().zip(self.slopes.iter().copied());
+        let mut zones: Vec<_> = zones.filter(|&(eta, slope)| eta == 0.0 || slope != 0.0).collect();
+        zones.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (thresholds, slopes) = zones.into_iter().unzip();
         let plays = self.half_widths.iter().zip(&self.weights);
         let (half_widths, weights) = plays.filter(|(r, p)| **r == 0.0 || **p != 0.0).unzip();
-        let envelope = Deadzones::new(thresholds, slopes, Reading::OneSided)?;
+        let envelope = Deadzones::new(thresholds, slopes, self.reading)?;
         Ok(Gpi::new(envelope, PlayBank::new(half_widths, weights)?))
     }
-}
 
-impl Parameters {
-    /// Replaces samples of u by those of v, from F_i(-1) = start_i.
-    pub(super) fn apply(&self, start: &[f64], signal: &mut [f64]) {
+    /// Replaces samples of u by those of v; `start` as in [`Sensitivity::new`].
+    pub(super) fn apply(&self, start: Option<&[f64]>, signal: &mut [f64]) {
         let wanted = Derivatives::default();
         let mut sensitivity = Sensitivity::new(self, start, wanted);
         let mut row = vec![0.0; Sensitivity::columns(self, wanted)];
@@ -62,28 +86,32 @@ impl Parameters {
     }
 }
 
-/// A one-sided deadzone whose threshold is not zero.
-fn zone(threshold: f64, u: f64) -> f64 {
-    if threshold > 0.0 { (u - threshold).max(0.0) } else { (u - threshold).min(0.0) }
-}
-
 /// Which derivatives are wanted besides those by the weights and slopes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Derivatives {
     pub thresholds: bool,
+    pub half_widths: bool,
     pub starts: bool,
 }
 
-/// Streams v and its derivatives with respect to weights, slopes, thresholds and start values.
+/// Streams v and its derivatives with respect to weights, slopes, thresholds, half-widths and start
+/// values.
 ///
 /// A play's derivative by z is 1 while it slides and 0 while it sticks, so what reaches v from a
-/// parameter of the envelope is its effect on z at the time each play last slid.
+/// parameter of the envelope is its effect on z at the time each play last slid. By its half-width the
+/// derivative is -1 after sliding up and +1 after sliding down.
 pub(super) struct Sensitivity<'a> {
     parameters: &'a Parameters,
     wanted: Derivatives,
+    /// Taken at the first sample.
+    start: Option<&'a [f64]>,
+    /// u(k-1), which directional deadzones compare with.
+    previous: f64,
     plays: Vec<f64>,
     /// Whether play i still remembers its start value.
     remembers: Vec<bool>,
+    /// dF_i/dr_i.
+    directions: Vec<f64>,
     /// Z_j, then dz/d eta_j if wanted, when play i last slid: one after the other for each play.
     held: Vec<f64>,
     /// The same for the present sample.
@@ -93,48 +121,70 @@ pub(super) struct Sensitivity<'a> {
 }
 
 impl<'a> Sensitivity<'a> {
-    /// Starts with F_i(-1) = start_i.
-    pub(super) fn new(parameters: &'a Parameters, start: &[f64], wanted: Derivatives) -> Self {
+    /// Starts from rest, or with F_i(-1) = z(0) + s_i r_i for `start` s_i in [-1, 1]: a play stands
+    /// beside z, wherever the envelope takes z.
+    pub(super) fn new(
+        parameters: &'a Parameters,
+        start: Option<&'a [f64]>,
+        wanted: Derivatives,
+    ) -> Self {
         let n = parameters.half_widths.len();
         let zones = parameters.thresholds.len() * if wanted.thresholds { 2 } else { 1 };
         Self {
             parameters,
             wanted,
-            plays: start.to_vec(),
-            remembers: vec![true; n],
+            previous: 0.0,
+            start,
+            plays: vec![0.0; n],
+            remembers: vec![start.is_some(); n],
+            directions: vec![0.0; n],
             held: vec![0.0; n * zones],
             present: vec![0.0; zones],
             sums: vec![0.0; zones],
         }
     }
 
-    /// How many values [`Sensitivity::step`] writes: v, plays, slopes, thresholds, starts.
+    /// How many values [`Sensitivity::step`] writes: v, weights, slopes, thresholds, half-widths,
+    /// starts.
     pub(super) fn columns(parameters: &Parameters, wanted: Derivatives) -> usize {
-        let times = |wanted: bool| if wanted { 2 } else { 1 };
         let (n, zones) = (parameters.half_widths.len(), parameters.thresholds.len());
-        1 + n * times(wanted.starts) + zones * times(wanted.thresholds)
+        let times = |count: usize, wanted: bool| if wanted { count } else { 0 };
+        1 + n
+            + zones
+            + times(zones, wanted.thresholds)
+            + times(n, wanted.half_widths)
+            + times(n, wanted.starts)
     }
 
-    /// One sample: `v`, then dv/d of the play weights, slopes, thresholds and start values.
+    /// One sample: `v`, then dv/d of the weights, slopes, thresholds, half-widths and start values.
     pub(super) fn step(&mut self, u: f64, output: &mut [f64]) {
-        let Parameters { thresholds, slopes, half_widths, weights } = self.parameters;
+        let Parameters { reading, thresholds, slopes, half_widths, weights } = self.parameters;
         let (n, zones) = (half_widths.len(), thresholds.len());
-        let mut z = u;
+        let mut z = 0.0;
         for j in 0..zones {
-            let value = zone(thresholds[j], u);
+            let value = reading.zone(thresholds[j], self.previous, u);
             self.present[j] = value;
             if self.wanted.thresholds {
-                self.present[zones + j] = if value == 0.0 { 0.0 } else { -slopes[j] };
+                let falling = *reading == Reading::Directional && u < self.previous;
+                let side = if falling { 1.0 } else { -1.0 };
+                self.present[zones + j] = if value == 0.0 { 0.0 } else { side * slopes[j] };
             }
             z += slopes[j] * value;
         }
+        self.previous = u;
+        if let Some(start) = self.start.take() {
+            self.stand(z, start);
+        }
         let held_size = self.present.len();
+        let widths = 1 + n + held_size;
+        let starts = widths + if self.wanted.half_widths { n } else { 0 };
         let mut v = 0.0;
         for i in 0..n {
             let previous = self.plays[i];
             let value = play(half_widths[i], z, previous);
             if value != previous || half_widths[i] == 0.0 {
                 self.remembers[i] = false;
+                self.directions[i] = if value > previous { -1.0 } else { 1.0 };
                 if weights[i] != 0.0 {
                     let held = &mut self.held[held_size * i..held_size * (i + 1)];
                     for (sum, (&present, &held)) in
@@ -148,12 +198,30 @@ impl<'a> Sensitivity<'a> {
             self.plays[i] = value;
             v += weights[i] * value;
             output[1 + i] = value;
+            if self.wanted.half_widths {
+                output[widths + i] = weights[i] * self.directions[i];
+            }
             if self.wanted.starts {
-                output[1 + n + held_size + i] = if self.remembers[i] { weights[i] } else { 0.0 };
+                let moved = if self.remembers[i] { half_widths[i] } else { 0.0 };
+                output[starts + i] = weights[i] * moved;
             }
         }
         output[0] = v;
-        output[1 + n..1 + n + held_size].copy_from_slice(&self.sums);
+        output[1 + n..widths].copy_from_slice(&self.sums);
+    }
+
+    /// Puts the plays beside the first z, with which they move.
+    fn stand(&mut self, z: f64, start: &[f64]) {
+        let Parameters { half_widths, weights, .. } = self.parameters;
+        for (i, &side) in start.iter().enumerate() {
+            self.plays[i] = z + side * half_widths[i];
+            self.directions[i] = side;
+            let held = &mut self.held[self.present.len() * i..self.present.len() * (i + 1)];
+            held.copy_from_slice(&self.present);
+            for (sum, present) in self.sums.iter_mut().zip(&self.present) {
+                *sum += weights[i] * present;
+            }
+        }
     }
 }
 
@@ -163,8 +231,8 @@ mod tests {
     use crate::operators::Operator;
 
     fn run(parameters: &Parameters, start: &[f64], u: &[f64]) -> Vec<Vec<f64>> {
-        let wanted = Derivatives { thresholds: true, starts: true };
-        let mut sensitivity = Sensitivity::new(parameters, start, wanted);
+        let wanted = Derivatives { thresholds: true, half_widths: true, starts: true };
+        let mut sensitivity = Sensitivity::new(parameters, Some(start), wanted);
         let mut row = vec![0.0; Sensitivity::columns(parameters, wanted)];
         u.iter()
             .map(|&value| {
@@ -177,19 +245,22 @@ mod tests {
     #[test]
     fn derivatives_agree_with_differences_of_the_operator() {
         let parameters = Parameters {
-            thresholds: vec![-0.7, 0.6],
-            slopes: vec![0.3, -0.4],
+            reading: Reading::OneSided,
+            thresholds: vec![0.0, -0.7, 0.6],
+            slopes: vec![1.1, 0.3, -0.4],
             half_widths: vec![0.0, 0.31, 0.8],
             weights: vec![1.0, 0.5, 0.7],
         };
-        let start = [0.1, 0.2, -0.3];
+        let start = [0.0, 0.4, -0.3];
         let u: Vec<f64> = (0..300)
             .map(|k| (f64::from(k) * 0.137).sin() * 1.5 + 0.4 * (f64::from(k) * 0.731).cos())
             .collect();
         let rows = run(&parameters, &start, &u);
         let operator = parameters.to_operator().unwrap();
         let mut state = operator.rest();
-        state.plays = operator.plays().state_from(start.to_vec()).unwrap();
+        let z = parameters.envelope(0.0, u[0]);
+        let plays = start.iter().zip(&parameters.half_widths).map(|(s, r)| z + s * r);
+        state.plays = operator.plays().state_from(plays.collect()).unwrap();
         for (row, &value) in rows.iter().zip(&u) {
             assert!((row[0] - operator.step(&mut state, value)).abs() < 1e-12);
         }
@@ -210,15 +281,23 @@ mod tests {
             compare(1 + i, &moved, &start);
             let mut moved = start;
             moved[i] += step;
-            compare(1 + 3 + 4 + i, &parameters, &moved);
+            compare(1 + 3 + 6 + 3 + i, &parameters, &moved);
         }
-        for j in 0..2 {
+        for i in 1..3 {
+            let mut moved = parameters.clone();
+            moved.half_widths[i] += step;
+            compare(1 + 3 + 6 + i, &moved, &start);
+        }
+        for j in 0..3 {
             let mut moved = parameters.clone();
             moved.slopes[j] += step;
             compare(1 + 3 + j, &moved, &start);
+            if j == 0 {
+                continue;
+            }
             let mut moved = parameters.clone();
             moved.thresholds[j] += step;
-            compare(1 + 3 + 2 + j, &moved, &start);
+            compare(1 + 3 + 3 + j, &moved, &start);
         }
     }
 }

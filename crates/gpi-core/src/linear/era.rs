@@ -100,8 +100,13 @@ impl Hankel {
 
     /// How many singular values are above rounding.
     pub(crate) fn rank(&self) -> usize {
+        self.significant(1e-14)
+    }
+
+    /// How many singular values are above a fraction of the largest.
+    pub(crate) fn significant(&self, fraction: f64) -> usize {
         let s = &self.decomposition.s;
-        s.iter().take_while(|&&value| value > 1e-14 * s[0] && value > 0.0).count()
+        s.iter().take_while(|&&value| value > fraction * s[0] && value > 0.0).count()
     }
 
     /// The order at which the singular values fall off.

@@ -74,13 +74,19 @@ impl NormalEquations {
     }
 }
 
-/// Minimises `x^T gram x - 2 x^T rhs` over x with `x[i] >= lower[i]` (Lawson-Hanson active set).
+/// Minimises `x^T gram x - 2 x^T rhs` over `lower <= x <= upper`, which contain zero (active set method
+/// of Lawson and Hanson, with two bounds as by Stark and Parker).
 ///
-/// `lower[i] = -inf` leaves an unknown free. Unknowns are scaled to one size first, and what the
-/// equations leave open is drawn towards zero.
-pub(crate) fn bounded(gram: &Matrix, rhs: &DVector<f64>, lower: &DVector<f64>) -> DVector<f64> {
+/// Bounds may be infinite. Unknowns are scaled to one size first, and what the equations leave open is
+/// drawn towards zero.
+pub(crate) fn bounded(
+    gram: &Matrix,
+    rhs: &DVector<f64>,
+    lower: &DVector<f64>,
+    upper: &DVector<f64>,
+) -> DVector<f64> {
     /// Relative to the diagonal: far below what data determine, above the rounding of the squares.
-    const REGULARIZATION: f64 = 1e-11;
+    const REGULARIZATION: f64 = 1e-14;
     let scale = gram.diagonal().map(|square| if square > 0.0 { square.sqrt() } else { 1.0 });
     let n = rhs.len();
     let mut scaled = Matrix::from_fn(n, n, |i, j| gram[(i, j)] / (scale[i] * scale[j]));
@@ -88,34 +94,56 @@ pub(crate) fn bounded(gram: &Matrix, rhs: &DVector<f64>, lower: &DVector<f64>) -
         scaled[(i, i)] += REGULARIZATION;
     }
     let target = rhs.component_div(&scale);
-    active_set(&scaled, &target, &lower.component_mul(&scale)).component_div(&scale)
+    let (lower, upper) = (lower.component_mul(&scale), upper.component_mul(&scale));
+    active_set(&scaled, &target, &lower, &upper).component_div(&scale)
 }
 
-fn active_set(gram: &Matrix, rhs: &DVector<f64>, lower: &DVector<f64>) -> DVector<f64> {
+fn active_set(
+    gram: &Matrix,
+    rhs: &DVector<f64>,
+    lower: &DVector<f64>,
+    upper: &DVector<f64>,
+) -> DVector<f64> {
     let n = rhs.len();
-    let mut x = lower.map(|bound| if bound.is_finite() { bound } else { 0.0 });
-    let mut passive: Vec<bool> = lower.iter().map(|bound| !bound.is_finite()).collect();
-    let slack = 1e-12 * (rhs.amax() + (gram * &x).amax());
+    let mut x = DVector::zeros(n);
+    // All that may move are free at first; weights that want to fall below zero are caught one by one.
+    let mut passive: Vec<bool> = (0..n).map(|i| lower[i] < upper[i]).collect();
+    let slack = 1e-12 * rhs.amax();
     // Each change of the active set lowers the cost; the bound guards against cycling by rounding.
     for _ in 0..3 * n.max(1) {
         while passive.iter().any(|&free| free) {
             let target = passive_solution(gram, rhs, &x, &passive);
             let mut fraction = 1.0;
             let mut blocking = None;
-            for i in (0..n).filter(|&i| passive[i] && target[i] < lower[i]) {
-                let step = (x[i] - lower[i]) / (x[i] - target[i]);
-                if step < fraction {
-                    (fraction, blocking) = (step, Some(i));
+            for i in (0..n).filter(|&i| passive[i]) {
+                let bound = if target[i] < lower[i] {
+                    lower[i]
+                } else if target[i] > upper[i] {
+                    upper[i]
+                } else {
+                    continue;
+                };
+                let step = (bound - x[i]) / (target[i] - x[i]);
+                if step < fraction || blocking.is_none() {
+                    (fraction, blocking) = (step.min(fraction), Some((i, bound)));
                 }
             }
             x += fraction * (&target - &x);
-            let Some(i) = blocking else { break };
-            x[i] = lower[i];
+            let Some((i, bound)) = blocking else { break };
+            x[i] = bound;
             passive[i] = false;
         }
         let descent = rhs - gram * &x;
-        let entering = (0..n).filter(|&i| !passive[i] && descent[i] > slack);
-        match entering.max_by(|&i, &j| descent[i].total_cmp(&descent[j])) {
+        let inward = |i: usize| {
+            let (from_lower, from_upper) = (x[i] == lower[i], x[i] == upper[i]);
+            match (from_lower, from_upper) {
+                (true, false) => descent[i],
+                (false, true) => -descent[i],
+                _ => 0.0,
+            }
+        };
+        let entering = (0..n).filter(|&i| !passive[i] && inward(i) > slack);
+        match entering.max_by(|&i, &j| inward(i).total_cmp(&inward(j))) {
             Some(i) => passive[i] = true,
             None => break,
         }
@@ -165,13 +193,24 @@ mod tests {
         let b = DVector::from_fn(30, |i, _| (i as f64 * 0.37).cos() - 0.4);
         let (gram, rhs) = (a.tr_mul(&a), a.tr_mul(&b));
         let lower = DVector::from_vec(vec![0.0, 0.0, f64::NEG_INFINITY, 0.0, -0.1]);
-        let x = bounded(&gram, &rhs, &lower);
+        let free = DVector::from_element(5, f64::INFINITY);
+        let loose = bounded(&gram, &rhs, &lower, &free);
+        let mut upper = free;
+        let largest = loose.imax();
+        upper[largest] = 0.5 * loose[largest];
+        let x = bounded(&gram, &rhs, &lower, &upper);
         let gradient = &gram * &x - &rhs;
         for i in 0..5 {
-            assert!(x[i] >= lower[i]);
-            let at_bound = x[i] == lower[i];
-            assert!(if at_bound { gradient[i] > -1e-9 } else { gradient[i].abs() < 1e-8 });
+            assert!(x[i] >= lower[i] && x[i] <= upper[i]);
+            if x[i] == lower[i] {
+                assert!(gradient[i] > -1e-9);
+            } else if x[i] == upper[i] {
+                assert!(gradient[i] < 1e-9);
+            } else {
+                assert!(gradient[i].abs() < 1e-8);
+            }
         }
-        assert!((0..5).any(|i| x[i] == lower[i]), "the example must exercise a bound");
+        assert!((0..5).any(|i| x[i] == lower[i]), "the example must exercise a lower bound");
+        assert_eq!(x[largest], upper[largest], "and an upper one");
     }
 }

@@ -112,16 +112,26 @@ impl StateSpace {
     pub fn simulate_from(&self, state: &mut DVector<f64>, input: &Matrix) -> Result<Matrix, Error> {
         Error::require_equal("channels", ("input", input.ncols()), ("B", self.inputs()))?;
         Error::require_equal("states", ("state", state.len()), ("A", self.order()))?;
-        let drive = &self.b * input.transpose();
-        let mut states = Matrix::zeros(self.order(), input.nrows());
+        /// Samples whose states are held at once.
+        const BLOCK: usize = 1024;
+        let samples = input.nrows();
+        let mut output = Matrix::zeros(samples, self.outputs());
         let mut next = state.clone();
-        for k in 0..input.nrows() {
-            states.set_column(k, state);
-            next.copy_from(&drive.column(k));
-            next.gemv(1.0, &self.a, state, 1.0);
-            std::mem::swap(state, &mut next);
+        for first in (0..samples).step_by(BLOCK) {
+            let rows = BLOCK.min(samples - first);
+            let input = input.rows(first, rows).transpose();
+            let drive = &self.b * &input;
+            let mut states = Matrix::zeros(self.order(), rows);
+            for k in 0..rows {
+                states.set_column(k, state);
+                next.copy_from(&drive.column(k));
+                next.gemv(1.0, &self.a, state, 1.0);
+                std::mem::swap(state, &mut next);
+            }
+            let block = &self.c * states + &self.d * input;
+            output.rows_mut(first, rows).tr_copy_from(&block);
         }
-        Ok((&self.c * states + &self.d * input.transpose()).transpose())
+        Ok(output)
     }
 
     /// The outputs from rest, x(0) = 0.

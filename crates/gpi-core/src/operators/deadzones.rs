@@ -17,6 +17,42 @@ pub enum Reading {
     Directional,
 }
 
+impl Reading {
+    /// Z_eta of one sample, without its weight; `previous` is u(k-1).
+    ///
+    /// ```
+    /// use gpi_core::operators::Reading;
+    /// assert_eq!(Reading::OneSided.zone(1.0, 4.0, 3.0), 2.0);
+    /// assert_eq!(Reading::Directional.zone(1.0, 4.0, 3.0), 0.0); // u falls, but not below -1
+    /// ```
+    #[inline]
+    pub fn zone<T: Sample>(self, threshold: T, previous: T, input: T) -> T {
+        let zero = T::ZERO;
+        match self {
+            Self::OneSided => {
+                let beyond = input - threshold;
+                if threshold == zero
+                    || (threshold > zero && beyond > zero)
+                    || (threshold < zero && beyond < zero)
+                {
+                    beyond
+                } else {
+                    zero
+                }
+            }
+            Self::Directional => {
+                if input > previous && input > threshold {
+                    input - threshold
+                } else if input < previous && input < -threshold {
+                    input + threshold
+                } else {
+                    zero
+                }
+            }
+        }
+    }
+}
+
 /// A weighted sum of deadzones, equation (2) of the paper: `z(k) = sum_j g_j Z_{eta_j}[u](k)`.
 ///
 /// Thresholds have the unit of the input; weights are slopes (unit of z per unit of u).
@@ -75,29 +111,7 @@ impl<S: Storage> Deadzones<S> {
     /// Z_eta of one sample, without its weight; `previous` is u(k-1).
     #[inline]
     pub fn zone(&self, threshold: S::Item, previous: S::Item, input: S::Item) -> S::Item {
-        let zero = S::Item::ZERO;
-        match self.reading {
-            Reading::OneSided => {
-                let beyond = input - threshold;
-                if threshold == zero
-                    || (threshold > zero && beyond > zero)
-                    || (threshold < zero && beyond < zero)
-                {
-                    beyond
-                } else {
-                    zero
-                }
-            }
-            Reading::Directional => {
-                if input > previous && input > threshold {
-                    input - threshold
-                } else if input < previous && input < -threshold {
-                    input + threshold
-                } else {
-                    zero
-                }
-            }
-        }
+        self.reading.zone(threshold, previous, input)
     }
 }
 

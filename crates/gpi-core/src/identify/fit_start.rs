@@ -1,0 +1,65 @@
+//! The state that a record starts from, fitted with the model kept.
+
+use super::Progress;
+use super::levenberg_marquardt::{Fitted, fit};
+use super::point::DynamicsFreedom;
+use super::preparation::{Prepared, rescale};
+use super::refine::{RefineOptions, require_match, settings};
+use super::sensitivity::Parameters;
+use crate::linear::Sections;
+use crate::{Error, Matrix, Model, Record};
+
+/// Measured minus simulated outputs of each experiment, (samples, outputs), where the start of
+/// experiments that begin in motion is fitted to the record and the model is kept.
+///
+/// Only what happened before the record is estimated: the place of every play beside z(0), and the
+/// state of G; an experiment that begins at rest, or has a warm-up, is simulated as it is. This is
+/// what MATLAB's `compare` does with the initial state.
+///
+/// # Errors
+/// Channels or rates that differ, [`Error::Interrupted`] when `progress` returned false.
+pub fn residuals_from_fitted_start(
+    model: &Model,
+    record: &Record,
+    progress: Progress,
+) -> Result<Vec<Matrix>, Error> {
+    const STEPS: usize = 60;
+    require_match(model, record)?;
+    let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
+    let prepared = Prepared::scoring_all(record, channels)?;
+    let mut point = prepared.point(Sections::from_delayed_state_space(model.linear())?);
+    rescale(&mut point);
+    for offsets in &mut point.offsets {
+        for (output, mut column) in offsets.column_iter_mut().enumerate() {
+            column.fill(model.offsets()[output] - prepared.means[output]);
+        }
+    }
+    let mut options = settings(&prepared, &RefineOptions::default(), STEPS);
+    options.freedom.weights = false;
+    options.freedom.identity = false;
+    options.freedom.dynamics = DynamicsFreedom::Nothing;
+    // The cost has a minimum wherever another set of plays turns at the first peaks.
+    let mut best: Option<Fitted> = None;
+    for side in [0.0, -0.5, 0.5] {
+        let mut beside = point.clone();
+        beside
+            .pasts
+            .iter_mut()
+            .filter_map(|past| past.plays.as_mut())
+            .flatten()
+            .for_each(|plays| plays.fill(side));
+        let fitted = fit(beside, &prepared.record, &options, "start", progress)?;
+        let cost = fitted.linearization.cost;
+        if best.as_ref().is_none_or(|best| cost < best.linearization.cost) {
+            best = Some(fitted);
+        }
+    }
+    let fitted = best.map_or(point, |best| best.point);
+    let with_start = fitted.residuals(&prepared.record)?;
+    // what is known needs no fit
+    let as_it_is = model.residuals(record)?;
+    let choose = |(index, (fitted, known))| {
+        if prepared.moving[index] { fitted } else { known }
+    };
+    Ok(with_start.into_iter().zip(as_it_is).enumerate().map(choose).collect())
+}

@@ -1,0 +1,130 @@
+//! Gauss-Newton with Levenberg and Marquardt's damping, within bounds.
+
+use super::linearization::{Linearization, Weighting};
+use super::point::{Freedom, Point};
+use super::{Progress, report};
+use crate::linear::bounded;
+use crate::{Error, Record};
+
+/// How a fit ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// No step is left that would lower the cost by more than its tolerance.
+    Converged,
+    /// Steps that should lower the cost do not, however short: the cost has a kink here, where a play
+    /// begins to turn at another sample, or rounding hides what is left.
+    Stalled,
+    /// The largest number of steps was taken.
+    Limit,
+}
+
+impl Status {
+    /// The word for it: `converged`, `stalled` or `limit`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::Stalled => "stalled",
+            Self::Limit => "limit",
+        }
+    }
+}
+
+/// Where a fit ended and how it got there.
+#[derive(Clone)]
+pub(super) struct Fitted {
+    pub point: Point,
+    pub linearization: Linearization,
+    /// The cost at the start and after every accepted step.
+    pub history: Vec<f64>,
+    pub status: Status,
+}
+
+/// What is free, how residuals count, and when to options.
+#[derive(Clone, Debug)]
+pub(super) struct FitOptions {
+    pub freedom: Freedom,
+    pub weighting: Weighting,
+    /// Linearizations, accepted or not.
+    pub steps: usize,
+    /// A step that is predicted and found to gain less than this fraction of the cost is the last.
+    pub gain: f64,
+}
+
+impl Fitted {
+    /// The same fit with what came before it in its history. Where the loss has changed, the earlier
+    /// costs are brought to the scale of the later ones: both know the cost of the point between.
+    pub(super) fn after(mut self, before: &[f64]) -> Self {
+        if let (Some(last), Some(first)) = (before.last(), self.history.first()) {
+            let scale = if *last > 0.0 { first / last } else { 1.0 };
+            let earlier = before[..before.len() - 1].iter().map(|cost| scale * cost);
+            self.history.splice(0..0, earlier);
+        }
+        self
+    }
+}
+
+/// Minimises the cost over everything that is free.
+pub(super) fn fit(
+    point: Point,
+    record: &Record,
+    options: &FitOptions,
+    stage: &str,
+    progress: Progress,
+) -> Result<Fitted, Error> {
+    const LARGEST_DAMPING: f64 = 1e6;
+    let mut linearize = |point: &Point, step: usize| {
+        let done = step as f64 / options.steps as f64;
+        let mut check = || report(progress, stage, done);
+        Linearization::new(point, record, options.freedom, &options.weighting, &mut check)
+    };
+    let mut point = point;
+    let mut current = linearize(&point, 0)?;
+    let mut history = vec![current.cost];
+    let (mut damping, mut growth) = (1e-4_f64, 2.0);
+    let mut status = Status::Limit;
+    // What rounding leaves of the outputs' squares.
+    let outputs = record.experiments().iter().flat_map(|e| e.output.column_iter().enumerate());
+    let squares =
+        outputs.map(|(o, column)| options.weighting.outputs[o].powi(2) * column.norm_squared());
+    let exact = 1e-25 * squares.sum::<f64>();
+    for step in 1..=options.steps {
+        let layout = &current.layout;
+        let bounds = point.bounds(layout, record, options.freedom);
+        let mut gram = current.equations.gram.clone();
+        for i in (0..layout.len).filter(|&i| !layout.is_linear(i)) {
+            gram[(i, i)] *= 1.0 + damping;
+        }
+        let change = bounded(&gram, &current.descent(), &bounds.lower, &bounds.upper);
+        let predicted = current.predicted(&change);
+        // Also where the bounds leave nothing to go, or all is explained to the last digit.
+        if predicted <= 1e-3 * options.gain * current.cost || current.cost <= exact {
+            status = Status::Converged;
+            break;
+        }
+        let trial = point.moved(&change, layout);
+        let linearization = linearize(&trial, step)?;
+        if linearization.cost < current.cost {
+            let gained = current.cost - linearization.cost;
+            let small =
+                gained < options.gain * current.cost && predicted < options.gain * current.cost;
+            (point, current) = (trial, linearization);
+            history.push(current.cost);
+            // Nielsen's rule: as far as the prediction was right, less damping.
+            let ratio = gained / predicted;
+            damping = (damping * (1.0 - (2.0 * ratio - 1.0).powi(3)).max(0.1)).max(1e-15);
+            growth = 2.0;
+            if small {
+                status = Status::Converged;
+                break;
+            }
+        } else if damping > LARGEST_DAMPING {
+            status = Status::Stalled;
+            break;
+        } else {
+            damping = (growth * damping).max(1e-9);
+            growth *= 2.0;
+        }
+    }
+    Ok(Fitted { point, linearization: current, history, status })
+}

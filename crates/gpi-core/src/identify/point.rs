@@ -1,0 +1,388 @@
+//! Everything that is estimated, as one point, and where each unknown stands in a step away from it.
+
+use super::sensitivity::{Derivatives, Parameters};
+use crate::linear::Sections;
+use crate::{Matrix, Record};
+use nalgebra::DVector;
+use std::ops::Range;
+
+/// What was before the first sample of an experiment.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Past {
+    /// Where the plays stood between their lowest place beside z (-1) and their highest one (1),
+    /// `[input][play]`; `None` when the actuator came from rest.
+    pub plays: Option<Vec<Vec<f64>>>,
+    /// Whether the experiment began in motion, so that `state` is to be fitted.
+    pub moving: bool,
+    /// By how much the state of the sections at the first scored sample differs from that of an
+    /// actuator that stood still before the record.
+    pub state: DVector<f64>,
+}
+
+/// All parameters of a model and of its experiments.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Point {
+    /// One hysteresis an input.
+    pub channels: Vec<Parameters>,
+    pub dynamics: Sections,
+    /// One an experiment.
+    pub pasts: Vec<Past>,
+    /// The additive term at evenly spaced knots of each experiment, (knots, outputs); one knot is a
+    /// constant.
+    pub offsets: Vec<Matrix>,
+}
+
+/// What is free of the linear dynamics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum DynamicsFreedom {
+    Nothing,
+    /// Everything but the poles.
+    Numerator,
+    Everything,
+}
+
+/// Which parameters are free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Freedom {
+    /// Weights, slopes and offsets.
+    pub weights: bool,
+    /// Thresholds, half-widths, start values.
+    pub derivatives: Derivatives,
+    /// The slope of the deadzone of threshold 0. Held, it fixes the scale between envelope and plays;
+    /// free, the half-widths fix it.
+    pub identity: bool,
+    pub dynamics: DynamicsFreedom,
+}
+
+/// Where each group of unknowns stands.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Layout {
+    pub weights: Vec<Range<usize>>,
+    pub slopes: Vec<Range<usize>>,
+    pub thresholds: Vec<Range<usize>>,
+    pub half_widths: Vec<Range<usize>>,
+    pub sections: Vec<SectionLayout>,
+    /// One unknown for each element of D by columns, `None` where the held DC gain sets it.
+    pub feedthrough: Vec<Option<usize>>,
+    /// `[experiment]`, (knots, outputs) by columns.
+    pub offsets: Vec<Range<usize>>,
+    /// `[experiment][input]`.
+    pub plays: Vec<Vec<Range<usize>>>,
+    /// `[experiment]`, the sections' states one after the other.
+    pub states: Vec<Range<usize>>,
+    pub len: usize,
+}
+
+/// Where the unknowns of one section stand.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct SectionLayout {
+    pub a: Range<usize>,
+    /// (order, inputs) by columns.
+    pub b: Range<usize>,
+    /// (outputs, order) by columns; empty for one output. The reference output's row is not used.
+    pub c: Range<usize>,
+}
+
+impl Layout {
+    pub(super) fn new(point: &Point, freedom: Freedom) -> Self {
+        let mut end = 0;
+        let mut take = |wanted: bool, count: usize| {
+            let start = end;
+            end += if wanted { count } else { 0 };
+            start..end
+        };
+        let Freedom { derivatives, dynamics, .. } = freedom;
+        let (inputs, outputs) = (point.channels.len(), point.dynamics.outputs());
+        let channels = &point.channels;
+        let weights = channels.iter().map(|c| take(true, c.weights.len())).collect();
+        let slopes = channels.iter().map(|c| take(true, c.slopes.len())).collect();
+        let thresholds =
+            channels.iter().map(|c| take(derivatives.thresholds, c.slopes.len())).collect();
+        let half_widths =
+            channels.iter().map(|c| take(derivatives.half_widths, c.weights.len())).collect();
+        let moves = dynamics != DynamicsFreedom::Nothing;
+        let section = |n: usize, take: &mut dyn FnMut(bool, usize) -> Range<usize>| SectionLayout {
+            a: take(dynamics == DynamicsFreedom::Everything, n),
+            b: take(moves, n * inputs),
+            c: take(moves && outputs > 1, n * outputs),
+        };
+        let sections =
+            point.dynamics.sections.iter().map(|s| section(s.order(), &mut take)).collect();
+        let mut feedthrough = Vec::new();
+        for (input, held) in point.dynamics.held.iter().enumerate() {
+            debug_assert_eq!(feedthrough.len(), input * outputs);
+            for output in 0..outputs {
+                let free = moves && output != held.0;
+                feedthrough.push(free.then(|| take(true, 1).start));
+            }
+        }
+        let offsets = point.offsets.iter().map(|knots| take(true, knots.len())).collect();
+        let unknown = |past: &Past| derivatives.starts && past.plays.is_some();
+        let plays = point
+            .pasts
+            .iter()
+            .map(|past| channels.iter().map(|c| take(unknown(past), c.weights.len())).collect())
+            .collect();
+        let order = point.dynamics.order();
+        let moved = |past: &Past| derivatives.starts && past.moving;
+        let states = point.pasts.iter().map(|past| take(moved(past), order)).collect();
+        let len = take(true, 0).end;
+        Self {
+            weights,
+            slopes,
+            thresholds,
+            half_widths,
+            sections,
+            feedthrough,
+            offsets,
+            plays,
+            states,
+            len,
+        }
+    }
+
+    /// Unknowns that enter the output linearly when all others are kept.
+    pub(super) fn is_linear(&self, unknown: usize) -> bool {
+        let among = |ranges: &[Range<usize>]| ranges.iter().any(|range| range.contains(&unknown));
+        among(&self.weights) || among(&self.offsets) || among(&self.states)
+    }
+}
+
+/// What a step may be, elementwise; a fixed unknown has both bounds at zero.
+pub(super) struct Bounds {
+    pub lower: DVector<f64>,
+    pub upper: DVector<f64>,
+}
+
+impl Point {
+    /// The bounds of a step: weights stay positive, plays stay around z, thresholds on their side of
+    /// zero and inside the range of u, half-widths in order.
+    pub(super) fn bounds(&self, layout: &Layout, record: &Record, freedom: Freedom) -> Bounds {
+        /// Fraction of a gap to a neighbour, or of a range, that one step may take.
+        const REACH: f64 = 0.4;
+        let mut lower = DVector::from_element(layout.len, f64::NEG_INFINITY);
+        let mut upper = DVector::from_element(layout.len, f64::INFINITY);
+        let mut bound = |unknown: usize, low: f64, high: f64| {
+            (lower[unknown], upper[unknown]) = (low.min(0.0), high.max(0.0));
+        };
+        for (input, channel) in self.channels.iter().enumerate() {
+            for (weight, i) in channel.weights.iter().zip(layout.weights[input].clone()) {
+                bound(i, -weight, f64::INFINITY);
+            }
+            if !freedom.weights {
+                let held = layout.weights[input].clone().chain(layout.slopes[input].clone());
+                held.for_each(|i| bound(i, 0.0, 0.0));
+            }
+            // The widest play that moves keeps its half-width: that is the scale of z.
+            let widest = channel.weights.iter().rposition(|&weight| weight > 0.0).unwrap_or(0);
+            if !freedom.identity || widest == 0 {
+                bound(layout.slopes[input].start, 0.0, 0.0);
+            }
+            let (low, high) = range(record, input);
+            let inside = 0.01 * (high - low);
+            let etas = &channel.thresholds;
+            for (place, i) in layout.thresholds[input].clone().enumerate().skip(1) {
+                let eta = etas[place];
+                // The nearest that it may come to: zero, the ends of the range, its neighbours.
+                let (below, above) = if eta > 0.0 {
+                    (low.max(0.0) + inside, high - inside)
+                } else {
+                    (low + inside, high.min(0.0) - inside)
+                };
+                let previous = if place > 1 { etas[place - 1] } else { f64::NEG_INFINITY };
+                let next = etas.get(place + 1).copied().unwrap_or(f64::INFINITY);
+                let below = below.max(eta + REACH * (previous - eta));
+                let above = above.min(eta + REACH * (next - eta));
+                bound(i, below - eta, above - eta);
+            }
+            if let Some(identity) = layout.thresholds[input].clone().next() {
+                bound(identity, 0.0, 0.0);
+            }
+            let widths = &channel.half_widths;
+            for (place, i) in layout.half_widths[input].clone().enumerate() {
+                if place == 0 || (place >= widest && freedom.identity) {
+                    bound(i, 0.0, 0.0);
+                    continue;
+                }
+                let below = widths[place] - widths[place - 1];
+                let above = widths.get(place + 1).map_or(below, |next| next - widths[place]);
+                bound(i, -REACH * below, REACH * above);
+            }
+        }
+        for (section, unknowns) in self.dynamics.sections.iter().zip(&layout.sections) {
+            let outputs = self.dynamics.outputs();
+            for i in unknowns.c.clone().skip(section.reference).step_by(outputs) {
+                bound(i, 0.0, 0.0);
+            }
+        }
+        if !freedom.weights {
+            layout.offsets.iter().flat_map(Clone::clone).for_each(|i| bound(i, 0.0, 0.0));
+        }
+        for (past, unknowns) in self.pasts.iter().zip(&layout.plays) {
+            let sides = past.plays.iter().flatten().zip(unknowns);
+            for (place, (side, i)) in
+                sides.flat_map(|(sides, i)| sides.iter().zip(i.clone()).enumerate())
+            {
+                // a play of half-width zero has no side
+                let free = if place == 0 { 0.0 } else { 1.0 };
+                bound(i, free * (-1.0 - side), free * (1.0 - side));
+            }
+        }
+        Bounds { lower, upper }
+    }
+
+    /// The unknowns that are not held.
+    pub(super) fn estimated(
+        &self,
+        layout: &Layout,
+        record: &Record,
+        freedom: Freedom,
+    ) -> Vec<usize> {
+        let Bounds { lower, upper } = self.bounds(layout, record, freedom);
+        (0..layout.len).filter(|&i| lower[i] < upper[i]).collect()
+    }
+
+    /// Puts plays without weight at `sides` beside z in turn and, where half-widths may move, spreads
+    /// them over the upper half below `limits` (one an input), where plays forget last; returns how
+    /// many there are.
+    pub(super) fn put_idle_plays(&mut self, sides: &[f64], limits: Option<&[f64]>) -> usize {
+        let mut moved = 0;
+        for (input, channel) in self.channels.iter_mut().enumerate() {
+            let is_idle = |&i: &usize| i > 0 && channel.weights[i] == 0.0;
+            let idle: Vec<usize> = (0..channel.weights.len()).filter(is_idle).collect();
+            moved += idle.len();
+            for (number, &play) in idle.iter().enumerate() {
+                let place = 0.5 + 0.5 * (number as f64 + 0.5) / idle.len() as f64;
+                if let Some(limits) = limits {
+                    channel.half_widths[play] = place * limits[input];
+                }
+            }
+            let mut order: Vec<usize> = (0..channel.weights.len()).collect();
+            order.sort_by(|&i, &j| channel.half_widths[i].total_cmp(&channel.half_widths[j]));
+            let reorder = |values: &mut Vec<f64>| {
+                *values = order.iter().map(|&place| values[place]).collect();
+            };
+            reorder(&mut channel.half_widths);
+            reorder(&mut channel.weights);
+            for places in self.pasts.iter_mut().filter_map(|past| past.plays.as_mut()) {
+                for (&play, &side) in idle.iter().zip(sides.iter().cycle()) {
+                    places[input][play] = side;
+                }
+                reorder(&mut places[input]);
+            }
+        }
+        moved
+    }
+
+    /// Drops plays and deadzones without weight and joins deadzones that have come together; says
+    /// whether there were any.
+    pub(super) fn drop_unused(&mut self) -> bool {
+        /// Thresholds closer than this fraction of their range are one.
+        const TOGETHER: f64 = 3e-3;
+        let mut dropped = false;
+        for (input, channel) in self.channels.iter_mut().enumerate() {
+            let bounds = |f: fn(f64, f64) -> f64| channel.thresholds.iter().copied().fold(0.0, f);
+            let closest = TOGETHER * (bounds(f64::max) - bounds(f64::min));
+            for place in 2..channel.thresholds.len() {
+                if channel.thresholds[place] - channel.thresholds[place - 1] < closest {
+                    channel.slopes[place] += std::mem::take(&mut channel.slopes[place - 1]);
+                }
+            }
+            let used = |place: &usize, weights: &[f64]| *place == 0 || weights[*place] != 0.0;
+            let plays: Vec<usize> =
+                (0..channel.weights.len()).filter(|i| used(i, &channel.weights)).collect();
+            let zones: Vec<usize> =
+                (0..channel.slopes.len()).filter(|j| used(j, &channel.slopes)).collect();
+            dropped |= plays.len() < channel.weights.len() || zones.len() < channel.slopes.len();
+            let keep = |values: &mut Vec<f64>, places: &[usize]| {
+                *values = places.iter().map(|&place| values[place]).collect();
+            };
+            keep(&mut channel.weights, &plays);
+            keep(&mut channel.half_widths, &plays);
+            keep(&mut channel.slopes, &zones);
+            keep(&mut channel.thresholds, &zones);
+            for sides in self.pasts.iter_mut().filter_map(|past| past.plays.as_mut()) {
+                keep(&mut sides[input], &plays);
+            }
+        }
+        dropped
+    }
+
+    /// Takes the weight from the deadzone, the identity apart, that has the largest share in each
+    /// direction that the data do not determine; says whether there was one.
+    pub(super) fn silence_deadzones(&mut self, layout: &Layout, open: &Matrix) -> bool {
+        /// Where it has a smaller share, the direction is about something else.
+        const SHARE: f64 = 0.3;
+        let mut silenced = false;
+        for direction in open.column_iter() {
+            let share = |i: &usize| direction[*i].abs();
+            let zones = layout.slopes.iter().enumerate();
+            let zones = zones.flat_map(|(input, unknowns)| {
+                unknowns.clone().skip(1).zip(1..).map(move |(i, place)| (input, place, i))
+            });
+            let largest = zones.max_by(|a, b| share(&a.2).total_cmp(&share(&b.2)));
+            if let Some((input, place, _)) = largest.filter(|(_, _, i)| share(i) > SHARE) {
+                self.channels[input].slopes[place] = 0.0;
+                silenced = true;
+            }
+        }
+        silenced
+    }
+
+    /// The point one step away. A section whose poles would leave the unit circle goes as far as they
+    /// stay inside.
+    pub(super) fn moved(&self, step: &DVector<f64>, layout: &Layout) -> Self {
+        let mut moved = self.clone();
+        let add = |values: &mut [f64], unknowns: &Range<usize>| {
+            for (value, i) in values.iter_mut().zip(unknowns.clone()) {
+                *value += step[i];
+            }
+        };
+        for (input, channel) in moved.channels.iter_mut().enumerate() {
+            add(&mut channel.weights, &layout.weights[input]);
+            channel.weights.iter_mut().for_each(|weight| *weight = weight.max(0.0));
+            add(&mut channel.slopes, &layout.slopes[input]);
+            add(&mut channel.thresholds, &layout.thresholds[input]);
+            add(&mut channel.half_widths, &layout.half_widths[input]);
+        }
+        for (section, unknowns) in moved.dynamics.sections.iter_mut().zip(&layout.sections) {
+            let before = section.a.clone();
+            let mut fraction = 1.0;
+            loop {
+                for ((a, before), i) in section.a.iter_mut().zip(&before).zip(unknowns.a.clone()) {
+                    *a = before + fraction * step[i];
+                }
+                if section.is_stable() || fraction < 1e-6 {
+                    break;
+                }
+                fraction *= 0.5;
+            }
+            if !section.is_stable() {
+                section.a = before;
+            }
+            add(section.b.as_mut_slice(), &unknowns.b);
+            add(section.c.as_mut_slice(), &unknowns.c);
+        }
+        for (element, unknown) in moved.dynamics.d.iter_mut().zip(&layout.feedthrough) {
+            *element += unknown.map_or(0.0, |i| step[i]);
+        }
+        if layout.feedthrough.iter().any(Option::is_some) || !layout.sections.is_empty() {
+            moved.dynamics.hold_gain();
+        }
+        for (index, start) in moved.pasts.iter_mut().enumerate() {
+            add(moved.offsets[index].as_mut_slice(), &layout.offsets[index]);
+            add(start.state.as_mut_slice(), &layout.states[index]);
+            let plays = start.plays.iter_mut().flatten().zip(&layout.plays[index]);
+            plays.for_each(|(plays, unknowns)| add(plays, unknowns));
+        }
+        moved
+    }
+}
+
+/// Smallest and largest input of all experiments.
+pub(super) fn range(record: &Record, input: usize) -> (f64, f64) {
+    let columns = record.experiments().iter().map(|e| e.input.column(input));
+    columns.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), column| {
+        (low.min(column.min()), high.max(column.max()))
+    })
+}

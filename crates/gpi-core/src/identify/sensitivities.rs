@@ -1,0 +1,106 @@
+//! The derivatives that a refinement uses, handed out: for experiment design, other optimizers, checks.
+
+use super::linearization::{Linearization, Weighting};
+use super::point::{Layout, Point};
+use super::preparation::{Prepared, rescale};
+use super::refine::{RefineOptions, require_match, settings};
+use super::sensitivity::Parameters;
+use super::stream::Stream;
+use super::{Progress, report};
+use crate::linear::Sections;
+use crate::{Error, Matrix, Model, Record};
+use nalgebra::DVector;
+
+/// Derivatives of a model's simulated output with respect to everything that a refinement moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensitivities {
+    /// What each column is the derivative by, as in [`Parameter`](super::Parameter).
+    pub names: Vec<String>,
+    /// The values at which the derivatives were taken.
+    pub values: Vec<f64>,
+    /// For each experiment and output, (scored samples, parameters).
+    pub jacobians: Vec<Vec<Matrix>>,
+    /// Half the gradient of the sum of squared residuals.
+    pub gradient: DVector<f64>,
+    /// Half its Hessian in the Gauss-Newton approximation: `J^T J`.
+    pub hessian: Matrix,
+    /// Sum of squared residuals.
+    pub cost: f64,
+}
+
+/// Derivatives of the simulated output of `model` on a record by its parameters; `J` is built in full,
+/// so for records that fit into memory as many times as there are parameters.
+///
+/// G is held to its DC gain: where `section[i]` or `feedthrough` change, the element of D that belongs to
+/// the largest DC gain of the input makes up for it.
+///
+/// # Errors
+/// As for [`refine`](super::refine).
+pub fn sensitivities(
+    model: &Model,
+    record: &Record,
+    options: &RefineOptions,
+    progress: Progress,
+) -> Result<Sensitivities, Error> {
+    require_match(model, record)?;
+    let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
+    let prepared = Prepared::new(record, channels)?;
+    let mut point = prepared.point(Sections::from_delayed_state_space(model.linear())?);
+    rescale(&mut point);
+    for offsets in &mut point.offsets {
+        *offsets = Matrix::zeros(options.offset_knots.max(1), prepared.means.len());
+        for (output, mut column) in offsets.column_iter_mut().enumerate() {
+            column.fill(model.offsets()[output] - prepared.means[output]);
+        }
+    }
+    let freedom = settings(&prepared, options, 1).freedom;
+    let layout = Layout::new(&point, freedom);
+    let kept = point.estimated(&layout, &prepared.record, freedom);
+    let mut jacobians = Vec::new();
+    for (index, experiment) in prepared.record.experiments().iter().enumerate() {
+        let samples = experiment.input.nrows() - experiment.warmup;
+        let mut own = vec![Matrix::zeros(samples, kept.len()); prepared.means.len()];
+        let mut first = 0;
+        Stream::new(&point, &layout, freedom.derivatives, experiment, index).run(&mut |rows| {
+            report(progress, "sensitivities", 0.0)?;
+            for (jacobian, regressor) in own.iter_mut().zip(rows.regressors) {
+                for (column, &i) in kept.iter().enumerate() {
+                    let values = regressor.row(i).transpose();
+                    jacobian.view_mut((first, column), (values.len(), 1)).copy_from(&values);
+                }
+            }
+            first += rows.residuals.ncols();
+            Ok(())
+        })?;
+        jacobians.push(own);
+    }
+    let weighting = Weighting::equal(prepared.means.len());
+    let mut check = || report(progress, "sensitivities", 1.0);
+    let found = Linearization::new(&point, &prepared.record, freedom, &weighting, &mut check)?;
+    let (names, values) = names_and_values(&point, &layout, &prepared);
+    let gram = &found.equations.gram;
+    Ok(Sensitivities {
+        names: kept.iter().map(|&i| names[i].clone()).collect(),
+        values: kept.iter().map(|&i| values[i]).collect(),
+        jacobians,
+        gradient: DVector::from_fn(kept.len(), |i, _| -found.equations.rhs[kept[i]]),
+        hessian: Matrix::from_fn(kept.len(), kept.len(), |i, j| gram[(kept[i], kept[j])]),
+        cost: found.cost,
+    })
+}
+
+/// Names and values of all unknowns, offsets with the means that were taken from the outputs.
+pub(super) fn names_and_values(
+    point: &Point,
+    layout: &Layout,
+    prepared: &Prepared,
+) -> (Vec<String>, Vec<f64>) {
+    let mut values = layout.values(point);
+    for unknowns in &layout.offsets {
+        let knots = unknowns.len() / prepared.means.len();
+        for (place, i) in unknowns.clone().enumerate() {
+            values[i] += prepared.means[place / knots];
+        }
+    }
+    (layout.names(point, &prepared.record), values)
+}

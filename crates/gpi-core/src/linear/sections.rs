@@ -1,0 +1,319 @@
+//! The linear dynamics as sections in parallel: as many parameters as G has degrees of freedom.
+
+use super::StateSpace;
+use super::decompose::{eigen, solve};
+use crate::{Error, Matrix};
+use nalgebra::DVector;
+use num_complex::Complex64;
+
+/// One or two states in observer form:
+/// `x1+ = -a1 x1 + x2 + b1 v`, `x2+ = -a2 x1 + b2 v`, seen by the reference output as x1.
+///
+/// Two real poles and a conjugate pair are the same two numbers a1, a2, so that a fit can pass from
+/// one to the other.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Section {
+    /// The denominator `z^order + a1 z^(order-1) + ..`.
+    pub a: Vec<f64>,
+    /// (order, inputs).
+    pub b: Matrix,
+    /// (outputs, order); the reference output's row is 1, 0.
+    pub c: Matrix,
+    /// The output that fixes the states' scale.
+    pub reference: usize,
+}
+
+/// `G(z) = z^-delay (D + sum of sections)`, each column of G held to a DC gain by D.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Sections {
+    pub delay: usize,
+    pub sections: Vec<Section>,
+    /// (outputs, inputs).
+    pub d: Matrix,
+    /// For each input: the output at which the DC gain is held, and that gain.
+    pub held: Vec<(usize, f64)>,
+}
+
+impl Section {
+    pub(crate) fn order(&self) -> usize {
+        self.a.len()
+    }
+
+    /// A, (order, order).
+    pub(crate) fn matrix(&self) -> Matrix {
+        match self.a[..] {
+            [a1, a2] => Matrix::from_row_slice(2, 2, &[-a1, 1.0, -a2, 0.0]),
+            _ => Matrix::from_element(1, 1, -self.a[0]),
+        }
+    }
+
+    /// The state that a constant drive of each unknown (order, n) leads to: `(I - A)^-1 drive`.
+    pub(crate) fn standing(&self, drive: &Matrix) -> Matrix {
+        let mut states = drive.clone();
+        match self.a[..] {
+            [a1, a2] => {
+                for mut column in states.column_iter_mut() {
+                    let x1 = (column[0] + column[1]) / (1.0 + a1 + a2);
+                    (column[0], column[1]) = (x1, column[1] - a2 * x1);
+                }
+            }
+            _ => states /= 1.0 + self.a[0],
+        }
+        states
+    }
+
+    /// Whether all poles lie inside a circle slightly smaller than the unit circle.
+    pub(crate) fn is_stable(&self) -> bool {
+        /// Poles beyond have a memory of more than 10^7 samples.
+        const MARGIN: f64 = 1e-7;
+        match self.a[..] {
+            [a1, a2] => a2 < 1.0 - MARGIN && 1.0 + a1 + a2 > MARGIN && 1.0 - a1 + a2 > MARGIN,
+            _ => self.a[0].abs() < 1.0 - MARGIN,
+        }
+    }
+
+    fn poles(&self) -> Vec<Complex64> {
+        match self.a[..] {
+            [a1, a2] => {
+                let root = Complex64::new(0.25 * a1 * a1 - a2, 0.0).sqrt();
+                vec![-0.5 * a1 + root, -0.5 * a1 - root]
+            }
+            _ => vec![Complex64::new(-self.a[0], 0.0)],
+        }
+    }
+
+    /// The section with poles `poles` and residues `seen` (outputs, poles) times `driven` (poles,
+    /// inputs).
+    fn from_poles(poles: &[Complex64], seen: &ComplexMatrix, driven: &ComplexMatrix) -> Self {
+        let (outputs, order) = seen.shape();
+        let size = |output: usize| seen.row(output).iter().map(|c| c.norm()).product::<f64>();
+        let reference = (0..outputs).max_by(|&i, &j| size(i).total_cmp(&size(j))).unwrap_or(0);
+        let real = |matrix: ComplexMatrix| matrix.map(|value| value.re);
+        if let [pole] = *poles {
+            let scale = seen[(reference, 0)];
+            let c = real(seen.map(|value| value / scale));
+            return Self { a: vec![-pole.re], b: real(driven * scale), c, reference };
+        }
+        let (first, second) = (poles[0], poles[1]);
+        let a = vec![-(first + second).re, (first * second).re];
+        let row = seen.row(reference);
+        let to_observer = ComplexMatrix::from_row_slice(
+            2,
+            2,
+            &[row[0], row[1], -row[0] * second, -row[1] * first],
+        );
+        let b = real(&to_observer * driven);
+        let mut c = Matrix::zeros(outputs, order);
+        if outputs > 1
+            && let Some(c_transposed) = solve(to_observer.transpose(), &seen.transpose())
+        {
+            c = real(c_transposed.transpose());
+        }
+        c.set_row(reference, &nalgebra::RowDVector::from_vec(vec![1.0, 0.0]));
+        Self { a, b, c, reference }
+    }
+}
+
+type ComplexMatrix = nalgebra::DMatrix<Complex64>;
+
+impl Sections {
+    /// A gain (outputs, inputs) after a delay in samples.
+    pub(crate) fn delayed_gain(gain: &Matrix, delay: usize) -> Self {
+        let held = vec![(0, 0.0); gain.ncols()];
+        Self { delay, sections: Vec::new(), d: gain.clone(), held }.holding_present_gain()
+    }
+
+    /// The same with a first-order lag in parallel that carries half of every gain.
+    pub(crate) fn with_lag(&self, pole: f64) -> Self {
+        let outputs = self.outputs();
+        let mut lagged = self.clone();
+        lagged.d *= 0.5;
+        for output in 0..outputs {
+            let c = Matrix::from_fn(outputs, 1, |row, _| f64::from(u8::from(row == output)));
+            let b = (1.0 - pole) * lagged.d.rows(output, 1);
+            lagged.sections.push(Section { a: vec![-pole], b, c, reference: output });
+        }
+        lagged
+    }
+
+    /// The sections of a state space, after `delay` samples that it does not contain.
+    pub(crate) fn from_state_space(system: &StateSpace, delay: usize) -> Result<Self, Error> {
+        let (poles, vectors) = eigen_of(system)?;
+        let complex = |matrix: &Matrix| matrix.map(|value| Complex64::new(value, 0.0));
+        let seen = complex(system.c()) * &vectors;
+        let driven = solve(vectors, &complex(system.b()))
+            .unwrap_or_else(|| ComplexMatrix::zeros(system.order(), system.inputs()));
+        let section = |members: Vec<usize>| {
+            let poles: Vec<Complex64> = members.iter().map(|&i| poles[i]).collect();
+            Section::from_poles(
+                &poles,
+                &seen.select_columns(&members),
+                &driven.select_rows(&members),
+            )
+        };
+        let sections = group(&poles).into_iter().map(section).collect();
+        let held = vec![(0, 0.0); system.inputs()];
+        Ok(Self { delay, sections, d: system.d().clone(), held }.holding_present_gain())
+    }
+
+    /// The sections of a state space, its leading samples without response counted as the delay.
+    pub(crate) fn from_delayed_state_space(system: &StateSpace) -> Result<Self, Error> {
+        let order = system.order();
+        let markov = system.markov(2 * order + 3);
+        let largest = markov.iter().map(Matrix::amax).fold(0.0, f64::max);
+        let delay = markov.iter().take_while(|tap| tap.amax() <= 1e-12 * largest).count();
+        if delay == 0 || delay >= markov.len() {
+            return Self::from_state_space(system, 0);
+        }
+        // What is left of G without its delay: y(k) = G v(k - delay), so C A^delay and H_delay.
+        let mut c = system.c().clone();
+        for _ in 0..delay {
+            c *= system.a();
+        }
+        let shorter =
+            StateSpace::new(system.a().clone(), system.b().clone(), c, markov[delay].clone())?;
+        let hankel = super::Hankel::new(&shorter.markov(8 * order + 3), None)?;
+        let states = hankel.significant(1e-9).min(order);
+        if states == 0 {
+            return Ok(Self::delayed_gain(&markov[delay], delay));
+        }
+        Self::from_state_space(&hankel.realize(states)?.system, delay)
+    }
+
+    pub(crate) fn inputs(&self) -> usize {
+        self.d.ncols()
+    }
+
+    pub(crate) fn outputs(&self) -> usize {
+        self.d.nrows()
+    }
+
+    /// States without those of the delay.
+    pub(crate) fn order(&self) -> usize {
+        self.sections.iter().map(Section::order).sum()
+    }
+
+    pub(crate) fn is_stable(&self) -> bool {
+        self.sections.iter().all(Section::is_stable)
+    }
+
+    /// The poles, without those of the delay.
+    pub(crate) fn poles(&self) -> Vec<Complex64> {
+        self.sections.iter().flat_map(Section::poles).collect()
+    }
+
+    /// G(1), (outputs, inputs).
+    pub(crate) fn dc_gain(&self) -> Matrix {
+        self.sections.iter().fold(self.d.clone(), |sum, s| sum + &s.c * s.standing(&s.b))
+    }
+
+    /// G(e^jw) at w radians per sample, (outputs, inputs).
+    pub(crate) fn response(&self, frequency: f64) -> ComplexMatrix {
+        let z = Complex64::from_polar(1.0, frequency);
+        let complex = |matrix: &Matrix| matrix.map(|value| Complex64::new(value, 0.0));
+        let mut sum = complex(&self.d);
+        for section in &self.sections {
+            // (z I - A)^-1 of the observer form, by hand
+            let resolvent = match section.a[..] {
+                [a1, a2] => {
+                    let denominator = z * z + a1 * z + a2;
+                    let one = Complex64::new(1.0, 0.0);
+                    let a2 = Complex64::new(a2, 0.0);
+                    ComplexMatrix::from_row_slice(2, 2, &[z, one, -a2, z + a1]) / denominator
+                }
+                _ => ComplexMatrix::from_element(1, 1, 1.0 / (z + section.a[0])),
+            };
+            sum += complex(&section.c) * resolvent * complex(&section.b);
+        }
+        sum * Complex64::from_polar(1.0, -frequency * self.delay as f64)
+    }
+
+    /// Holds the largest DC gain of every column at its present value.
+    pub(crate) fn holding_present_gain(mut self) -> Self {
+        let dc = self.dc_gain();
+        self.held = (0..self.inputs())
+            .map(|input| {
+                let output = dc.column(input).map(f64::abs).imax();
+                (output, dc[(output, input)])
+            })
+            .collect();
+        self
+    }
+
+    /// Gives every column of G a largest DC gain of plus or minus one; returns what was divided by.
+    pub(crate) fn to_unit_gain(&mut self) -> Vec<f64> {
+        let dc = self.dc_gain();
+        let mut gains = Vec::new();
+        for input in 0..self.inputs() {
+            let gain = dc.column(input).amax();
+            let gain = if gain > 0.0 && gain.is_finite() { gain } else { 1.0 };
+            self.d.column_mut(input).unscale_mut(gain);
+            for section in &mut self.sections {
+                section.b.column_mut(input).unscale_mut(gain);
+            }
+            gains.push(gain);
+        }
+        *self = std::mem::take(self).holding_present_gain();
+        gains
+    }
+
+    /// Makes D what the held DC gains ask for.
+    pub(crate) fn hold_gain(&mut self) {
+        let dc = self.dc_gain();
+        for (input, &(output, gain)) in self.held.iter().enumerate() {
+            self.d[(output, input)] += gain - dc[(output, input)];
+        }
+    }
+
+    /// The state space: the delay's shift registers, then the sections.
+    pub(crate) fn to_state_space(&self) -> Result<StateSpace, Error> {
+        let (inputs, outputs) = (self.inputs(), self.outputs());
+        let chain = StateSpace::delayed_gain(&Matrix::identity(inputs, inputs), self.delay);
+        let (delayed, order) = (chain.order(), self.order());
+        let total = delayed + order;
+        let mut a = Matrix::zeros(total, total);
+        let mut b = Matrix::zeros(total, inputs);
+        let mut c = Matrix::zeros(outputs, total);
+        a.view_mut((0, 0), (delayed, delayed)).copy_from(chain.a());
+        b.view_mut((0, 0), (delayed, inputs)).copy_from(chain.b());
+        c.view_mut((0, 0), (outputs, delayed)).copy_from(&(&self.d * chain.c()));
+        let mut first = delayed;
+        for section in &self.sections {
+            let n = section.order();
+            a.view_mut((first, first), (n, n)).copy_from(&section.matrix());
+            a.view_mut((first, 0), (n, delayed)).copy_from(&(&section.b * chain.c()));
+            b.view_mut((first, 0), (n, inputs)).copy_from(&(&section.b * chain.d()));
+            c.view_mut((0, first), (outputs, n)).copy_from(&section.c);
+            first += n;
+        }
+        StateSpace::new(a, b, c, &self.d * chain.d())
+    }
+}
+
+fn eigen_of(system: &StateSpace) -> Result<(DVector<Complex64>, ComplexMatrix), Error> {
+    if system.order() == 0 {
+        return Ok((DVector::zeros(0), ComplexMatrix::zeros(0, 0)));
+    }
+    eigen(system.a())
+}
+
+/// Conjugate pairs by ascending frequency, then real poles two by two in descending order, then a single one.
+fn group(poles: &DVector<Complex64>) -> Vec<Vec<usize>> {
+    let is_real = |i: &usize| poles[*i].im.abs() <= 1e-9 * poles[*i].norm().max(1e-300);
+    let (mut real, complex): (Vec<usize>, Vec<usize>) = (0..poles.len()).partition(is_real);
+    real.sort_by(|&i, &j| poles[j].re.total_cmp(&poles[i].re));
+    let mut upper: Vec<usize> = complex.iter().copied().filter(|&i| poles[i].im > 0.0).collect();
+    upper.sort_by(|&i, &j| poles[i].arg().total_cmp(&poles[j].arg()));
+    let mut lower: Vec<usize> = complex.into_iter().filter(|&i| poles[i].im < 0.0).collect();
+    let mut groups = Vec::new();
+    for i in upper {
+        let distance = |j: &usize| (poles[*j] - poles[i].conj()).norm();
+        let nearest =
+            (0..lower.len()).min_by(|&j, &k| distance(&lower[j]).total_cmp(&distance(&lower[k])));
+        if let Some(nearest) = nearest {
+            groups.push(vec![i, lower.swap_remove(nearest)]);
+        }
+    }
+    groups.extend(real.chunks(2).map(<[usize]>::to_vec));
+    groups
+}

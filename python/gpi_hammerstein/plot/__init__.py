@@ -1,0 +1,12 @@
+"""Pictures of stages and results, on Matplotlib axes.
+
+Every function draws on the axes it is given and returns them. Without axes it makes a figure with
+`matplotlib.pyplot.subplots`, which the caller shows, saves or closes. Bands are 1.96 standard deviations
+to each side, 95 % where the errors are normal.
+"""
+
+from gpi_hammerstein.plot.linear import bode, markov, singular_values
+from gpi_hammerstein.plot.search import candidates, history
+from gpi_hammerstein.plot.signals import fit, loop, residual
+
+__all__ = ["bode", "candidates", "fit", "history", "loop", "markov", "residual", "singular_values"]

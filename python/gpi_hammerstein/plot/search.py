@@ -1,0 +1,117 @@
+"""How a model was found: the structures compared, and the steps of the fit."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
+
+from gpi_hammerstein._native import Model
+from gpi_hammerstein.plot.style import BLUE, GREEN, VERMILION, axes, label, say_nothing_to_draw
+
+
+def candidates(model: Model, ax: Axes | None = None) -> Axes:
+    """Draw the information criterion and the rms of every structure that was compared.
+
+    Parameters
+    ----------
+    model
+        Result of :func:`gpi_hammerstein.identify`.
+    ax
+        Axes for the criterion; the rms gets an axis at the right.
+
+    Returns
+    -------
+    Axes
+        The criterion's axes; the numbers beside a structure are its order, plays, deadzones and delay.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.candidates(model)  # doctest: +SKIP
+    """
+    ax = axes(ax, 8.0, 4.5)
+    ax.set(xlabel="parameters used [-]", ylabel="criterion above the best [-]")
+    ax.set_title("Structures compared", pad=26.0)
+    found = model.identification
+    rows = [] if found is None else found.candidates
+    if not rows:
+        say_nothing_to_draw(ax, "no structures: not from identify")
+        return ax
+    used = np.array([row["used"] for row in rows])
+    criterion = np.array([row["criterion"] for row in rows])
+    above = criterion - criterion.min()
+    # Others stand tens of thousands above the best at 0, and one may use four times the parameters.
+    ax.set_yscale("symlog", linthresh=10.0)
+    ax.set_ylim(-3.0, 10 * max(10.0, float(above.max())))
+    ax.set_xscale("log")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(ScalarFormatter())
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    ax.set_xlim(0.8 * float(used.min()), 1.4 * float(used.max()))
+    right = ax.twinx()
+    [squares] = right.plot(used, [row["rms"] for row in rows], "s", ms=5, mfc="none", color=VERMILION)
+    right.set_ylabel(label("residual rms", model.output_units[0]))
+    [points] = ax.plot(used, above, "o", ms=5, color=BLUE)
+    chosen = next(place for place, row in enumerate(rows) if row["chosen"])
+    [ring] = ax.plot(used[chosen], above[chosen], "o", ms=12, mfc="none", mec=GREEN, mew=2)
+    level, last = 0, -np.inf
+    for place in np.argsort(used):
+        # The numbers of neighbours go above one another.
+        where = float(np.log(used[place]))
+        level = level + 1 if where - last < 0.15 * np.ptp(np.log(ax.get_xlim())) else 0
+        last = where
+        row = rows[place]
+        ax.annotate(
+            f"{row['order']}/{row['plays']}/{row['deadzones']}/{row['delay']}",
+            (used[place], above[place]),
+            xytext=(0, 9 + 11 * (level % 3)),
+            textcoords="offset points",
+            ha="center",
+            fontsize="small",
+        )
+    ax.legend(
+        [points, squares, ring],
+        ["criterion: order/plays/deadzones/delay", "rms (right)", "chosen"],
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=3,
+        frameon=False,
+        fontsize="small",
+    )
+    return ax
+
+
+def history(model: Model, ax: Axes | None = None) -> Axes:
+    """Draw the rms residual over the steps of the joint refinement, and the noise floor.
+
+    Parameters
+    ----------
+    model
+        Result of :func:`gpi_hammerstein.identify` or :func:`gpi_hammerstein.refine`.
+    ax
+        Axes to draw on.
+
+    Returns
+    -------
+    Axes
+        The axes. Several outputs are balanced by their residuals, so that no floor can be drawn.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.history(model)  # doctest: +SKIP
+    """
+    ax = axes(ax)
+    unit = model.output_units[0] if len(model.output_names) == 1 else ""
+    ax.set(xlabel="accepted steps [-]", ylabel=label("residual rms", unit or "-"), title="Joint refinement")
+    refinement = model.refinement
+    if refinement is None:
+        say_nothing_to_draw(ax, "no steps: the model was not refined")
+        return ax
+    steps = refinement.history
+    ax.plot(np.arange(len(steps)), steps, "o-", ms=3, lw=1.0, color=BLUE, label=refinement.status)
+    if steps.max() > 10 * steps.min():
+        ax.set_yscale("log")
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if len(model.output_names) == 1:
+        floor = refinement.noise_floor
+        ax.axhline(floor["rms"][0], color=VERMILION, ls="--", lw=1.0, label=f"noise floor: {floor['how']}")
+    ax.legend()
+    return ax

@@ -1,0 +1,172 @@
+"""Signals: the loop, the fit and what it leaves."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
+
+from gpi_hammerstein._native import Model, Record
+from gpi_hammerstein.plot.style import BLACK, BLUE, VERMILION, axes, label, shade_path
+
+
+def loop(u: ArrayLike, v: ArrayLike, model: Model | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the hysteresis loop, v over u.
+
+    Parameters
+    ----------
+    u
+        Input, (samples,).
+    v
+        Intermediate signal or output, (samples,).
+    model
+        A model of one input; its own loop is drawn on top, with its band where the model knows how sure
+        it is, and its units label the axes.
+    ax
+        Axes to draw on.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Raises
+    ------
+    ParameterError, DataError
+        The model does not accept u.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.loop(u, model.intermediate(u))  # doctest: +SKIP
+    """
+    ax = axes(ax, 5.0, 5.0)
+    x = np.asarray(u, dtype=np.float64).reshape(-1)
+    ax.plot(x, np.asarray(v, dtype=np.float64).reshape(-1), color=BLUE, lw=0.7, label="v")
+    unit_in, unit_out = "", ""
+    if model is not None:
+        unit_in, unit_out = model.input_units[0], model.output_units[0]
+        own = model.intermediate(x).reshape(-1)
+        ax.plot(x, own, color=VERMILION, lw=0.7, ls="--", label="model")
+        if model.refinement is not None:
+            shade_path(ax, x, own, model.refinement.loop_std(x).reshape(-1), VERMILION, unit_out)
+        # The place is fixed: to look for the best one takes half a minute for a long record.
+        ax.legend(loc="upper left")
+    ax.set_xlabel(label("input u", unit_in))
+    ax.set_ylabel(label("intermediate signal v", unit_out))
+    ax.set_title("Hysteresis loop")
+    return ax
+
+
+def fit(
+    model: Model,
+    record: Record,
+    ax: Axes | None = None,
+    *,
+    experiment: int = 0,
+    output: int = 0,
+    fit_start: bool = False,
+) -> Axes:
+    """Draw the measured and the simulated output over time.
+
+    Parameters
+    ----------
+    model
+        An identified model.
+    record
+        A record at the model's rate.
+    ax
+        Axes to draw on.
+    experiment, output
+        Which one to draw, counted from 0.
+    fit_start
+        Fit what was before the first sample, as in :meth:`gpi_hammerstein.Model.error`.
+
+    Returns
+    -------
+    Axes
+        The axes; the warm-up is shaded.
+
+    Raises
+    ------
+    ParameterError, DataError
+        The model does not accept the record's input.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.fit(model, record)  # doctest: +SKIP
+    """
+    ax = axes(ax, 9.0, 4.0)
+    measured = record.y[experiment][:, output]
+    simulated = measured - model.residual(record, fit_start=fit_start)[experiment][:, output]
+    t = np.arange(len(measured)) / record.rate
+    ax.plot(t, measured, color=BLUE, lw=1.0, label="measured")
+    ax.plot(t, simulated, color=VERMILION, lw=0.9, ls="--", label="simulated")
+    _shade_warmup(ax, record, experiment)
+    ax.legend(loc="upper right")
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel(label(record.output_names[output], record.output_units[output]))
+    ax.set_title("Simulation from the input alone")
+    return ax
+
+
+def residual(
+    model: Model,
+    record: Record,
+    ax: Axes | None = None,
+    *,
+    experiment: int = 0,
+    output: int = 0,
+    fit_start: bool = False,
+) -> Axes:
+    """Draw the measured output minus the simulated one over time.
+
+    Parameters
+    ----------
+    model
+        An identified model.
+    record
+        A record at the model's rate.
+    ax
+        Axes to draw on.
+    experiment, output
+        Which one to draw, counted from 0.
+    fit_start
+        Fit what was before the first sample, as in :meth:`gpi_hammerstein.Model.error`.
+
+    Returns
+    -------
+    Axes
+        The axes; the warm-up is shaded.
+
+    Raises
+    ------
+    ParameterError, DataError
+        The model does not accept the record's input.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.residual(model, record)  # doctest: +SKIP
+    """
+    ax = axes(ax, 9.0, 3.0)
+    values = model.residual(record, fit_start=fit_start)[experiment][:, output]
+    ax.plot(np.arange(len(values)) / record.rate, values, color=BLUE, lw=0.8)
+    _shade_warmup(ax, record, experiment)
+    scored = np.abs(values[record.warmup[experiment] :])
+    usual, largest = (float(value) for value in np.quantile(scored, [0.99, 1.0]))
+    # An unknown start or a few outliers may leave the picture, but it says so.
+    limit = largest if largest < 5 * usual else 2 * usual
+    if limit > 0:
+        ax.set_ylim(-1.15 * limit, 1.15 * limit)
+    beyond = int(np.sum(scored > 1.15 * limit))
+    if beyond:
+        text = f"{beyond} samples beyond, up to {largest:.3g}"
+        ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize="small")
+    ax.axhline(0.0, color=BLACK, lw=0.5)
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel(label(f"residual of {record.output_names[output]}", record.output_units[output]))
+    ax.set_title("What the model does not explain")
+    return ax
+
+
+def _shade_warmup(ax: Axes, record: Record, experiment: int) -> None:
+    warmup = record.warmup[experiment]
+    if warmup:
+        ax.axvspan(0.0, warmup / record.rate, color=BLACK, alpha=0.08, lw=0, label="warm-up, not scored")

@@ -1,0 +1,77 @@
+"""Colours, labels and bands that all pictures share."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from numpy.typing import NDArray
+
+# Okabe and Ito: told apart with every kind of colour vision.
+BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
+PURPLE, SKY, BLACK = "#CC79A7", "#56B4E9", "#000000"
+CYCLE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
+STYLES = ("-", "--", ":", "-.")
+
+# Standard deviations to each side that hold 95 % of a normal distribution.
+BAND = 1.96
+BAND_LABEL = "95 % band"
+SHADE = 0.25
+
+
+def axes(ax: Axes | None, width: float = 7.0, height: float = 4.0) -> Axes:
+    """Return the axes given, or those of a new figure."""
+    if ax is not None:
+        return ax
+    return plt.subplots(figsize=(width, height), layout="constrained")[1]
+
+
+def label(name: str, unit: str) -> str:
+    """Return the name of an axis with its unit in brackets."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def line_style(index: int) -> tuple[str, str]:
+    """Return colour and dashes of one line among many."""
+    return CYCLE[index % len(CYCLE)], STYLES[index // len(CYCLE) % len(STYLES)]
+
+
+def say_nothing_to_draw(ax: Axes, why: str) -> None:
+    """Write a sentence where there would be a picture."""
+    ax.text(0.5, 0.5, why, ha="center", va="center", transform=ax.transAxes)
+    ax.set(xticks=[], yticks=[])
+
+
+def shade(
+    ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], deviation: NDArray[np.float64], color: str
+) -> None:
+    """Shade the band around a line; gaps where the deviation is not known."""
+    known = np.isfinite(deviation)
+    if known.any():
+        half = BAND * np.where(known, deviation, 0.0)
+        ax.fill_between(
+            x, y - half, y + half, where=known.tolist(), color=color, alpha=SHADE, lw=0, label="_band"
+        )
+
+
+def shade_path(
+    ax: Axes,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    deviation: NDArray[np.float64],
+    color: str,
+    unit: str = "",
+) -> None:
+    """Shade the band around a path that runs back and forth; its legend tells the widest half."""
+    half = BAND * deviation
+    known = np.isfinite(half)
+    if not known.any():
+        return
+    lower, upper = np.column_stack([x, y - half]), np.column_stack([x, y + half])
+    corners = np.stack([lower[:-1], lower[1:], upper[1:], upper[:-1]], axis=1)
+    both = known[:-1] & known[1:]
+    text = f"{BAND_LABEL}, at most \u00b1{half[known].max():.2g} {unit}".rstrip()
+    # One colour without transparency: branches that overlap must not look surer.
+    pale = tuple(1 - SHADE * (1 - int(color[place : place + 2], 16) / 255) for place in (1, 3, 5))
+    band = PolyCollection(list(corners[both]), facecolors=[pale], edgecolors="none", zorder=1, label=text)
+    # Where the data leave the loop open, the band may leave the picture.
+    ax.add_collection(band, autolim=False)
