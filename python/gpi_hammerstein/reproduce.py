@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gpi_hammerstein._native import Deadzones, Gpi, PlayBank, StateSpace, era, fir
+from gpi_hammerstein._native import Deadzones, Gpi, PlayBank, Record, StateSpace, era, fir, identify
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -20,6 +20,8 @@ SAMPLES = 100_001
 TAPS = 31
 ORDERS = (2, 3)
 INVERSE_TAPS = 40
+# The joint refinement needs no more.
+REFINED_SAMPLES = 20_001
 
 NUMERATOR = (3.391e10,)
 DENOMINATOR = (1.0, 3759.0, 2.063e7, 7.514e10)
@@ -64,6 +66,23 @@ class Realisation:
 
 
 @dataclass(frozen=True)
+class RefinedResult:
+    """What the joint refinement makes of the same record, with the true order and grids given."""
+
+    system: StateSpace
+    system_error: float
+    """Relative error of G(e^jw) after scaling, over 1000 frequencies from 0 to pi."""
+    weights_error: float
+    """Largest error of a play weight over the largest weight, after scaling to the true sum; NaN where
+    the record does not determine them."""
+    deadzone_weights_error: float
+    """The same for the deadzone weights, after scaling."""
+    undetermined: int
+    """Combinations of parameters that the record does not determine."""
+    status: str
+
+
+@dataclass(frozen=True)
 class ReadingResult:
     """What one reading of equation (3) leads to."""
 
@@ -80,6 +99,7 @@ class ReadingResult:
     v_multisine: Array
     """The true intermediate signal of the record, first 6000 samples."""
     realisations: list[Realisation]
+    refined: RefinedResult
 
 
 @dataclass(frozen=True)
@@ -233,4 +253,64 @@ def run_reading(name: str, system: StateSpace) -> ReadingResult:
         v=v_sine,
         v_multisine=v[: len(sine)],
         realisations=realisations,
+        refined=refine_reading(hysteresis, u[:REFINED_SAMPLES], y[:REFINED_SAMPLES], system),
+    )
+
+
+def refine_reading(hysteresis: Gpi, u: Array, y: Array, system: StateSpace) -> RefinedResult:
+    """Identify and refine the example with the true order, thresholds, half-widths and reading.
+
+    Parameters
+    ----------
+    hysteresis
+        The true one.
+    u, y
+        Input and output without noise, (samples,).
+    system
+        The true G.
+
+    Returns
+    -------
+    RefinedResult
+        What came out, next to the truth.
+
+    Examples
+    --------
+    >>> refine_reading(hysteresis, u, y, system).system_error < 1e-6  # doctest: +SKIP
+    True
+    """
+    truth_envelope, truth_plays = hysteresis.envelope, hysteresis.plays
+    model = identify(
+        Record(u, y, rate=1 / PERIOD),
+        half_widths=truth_plays.half_widths,
+        thresholds=truth_envelope.thresholds,
+        order=ORDERS[-1],
+        reading=truth_envelope.reading,
+        robust=False,
+    )
+    refinement = model.refinement
+    assert refinement is not None, "identify refines"
+    angles = np.linspace(0.0, np.pi, 1000)
+    plays, envelope = model.hysteresis[0].plays, model.hysteresis[0].envelope
+    found = np.interp(truth_plays.half_widths, plays.half_widths, plays.weights, left=0.0, right=0.0)
+    found[~np.isin(truth_plays.half_widths, plays.half_widths)] = 0.0
+    found *= truth_plays.weights.sum() / found.sum()
+    # Deadzones of one threshold are one.
+    thresholds = np.unique(truth_envelope.thresholds)
+    of = [truth_envelope.thresholds == eta for eta in thresholds]
+    truth_slope = np.array([truth_envelope.weights[own].sum() for own in of])
+    slopes = dict(zip(envelope.thresholds, envelope.weights, strict=True))
+    slope = np.array([slopes.get(eta, 0.0) for eta in thresholds])
+    # G and z may both have changed their signs; where all plays slide all the time, z has no scale.
+    slope *= scale_to(slope, truth_slope)
+    known = [p["std"] is not None for p in refinement.parameters if p["name"].startswith("u.weights")]
+    worst = float(np.abs(found - truth_plays.weights).max() / truth_plays.weights.max())
+    worst_slope = float(np.abs(slope - truth_slope).max() / np.abs(truth_slope).max())
+    return RefinedResult(
+        system=model.linear,
+        system_error=relative_error(response(model.linear, angles), response(system, angles)),
+        weights_error=worst if all(known) else float("nan"),
+        deadzone_weights_error=worst_slope,
+        undetermined=len(refinement.undetermined),
+        status=refinement.status,
     )

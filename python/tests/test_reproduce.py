@@ -40,6 +40,20 @@ def test_figures_are_within_two_percent(name: str, found: Paper) -> None:
         assert realisation.v_error == pytest.approx(v, rel=0.02)
 
 
+@pytest.mark.parametrize("name", ["one-sided", "directional"])
+def test_the_refinement_removes_the_bias(name: str, found: Paper) -> None:
+    [reading] = [one for one in found.readings if one.name == name]
+    assert reading.refined.system_error < 1e-6
+    assert reading.refined.deadzone_weights_error < 1e-4
+    if name == "one-sided":
+        assert reading.refined.undetermined == 0
+        assert reading.refined.weights_error < 1e-4
+    else:
+        # z jumps at every turn, so that all plays slide and only the sum of their weights is seen
+        assert reading.refined.undetermined > 0
+        assert np.isnan(reading.refined.weights_error)
+
+
 def test_the_command_prints_and_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     assert run(["reproduce", "paper", "-o", str(out), "--json"]) == 0

@@ -1,6 +1,7 @@
 //! A point run free over the record, and the model that it is.
 
 use super::point::{Past, Point};
+use super::sensitivity::Parameters;
 use super::stream::hats;
 use crate::linear::Sections;
 use crate::{Error, Matrix, Model, Record};
@@ -75,7 +76,7 @@ impl Point {
         record: &Record,
         means: &[f64],
     ) -> Result<Model, Error> {
-        let hysteresis: Result<_, _> = self.channels.iter().map(|c| c.to_operator()).collect();
+        let hysteresis: Result<_, _> = self.channels.iter().map(Parameters::to_operator).collect();
         let (inputs, outputs) = (given.inputs().to_vec(), given.outputs().to_vec());
         let rest = self.mean_offsets(record);
         let offsets = means.iter().zip(rest.iter()).map(|(mean, rest)| mean + rest);

@@ -175,7 +175,7 @@ fn starts_at_rest(experiment: &Experiment) -> bool {
 
 /// Moves the gain of G into the play weights.
 pub(super) fn rescale(point: &mut Point) {
-    for (channel, gain) in point.channels.iter_mut().zip(point.dynamics.to_unit_gain()) {
+    for (channel, gain) in point.channels.iter_mut().zip(point.dynamics.normalize_gain()) {
         channel.weights.iter_mut().for_each(|weight| *weight *= gain);
     }
 }

@@ -147,6 +147,9 @@ impl<'a> Search<'a> {
     pub(super) fn lag(&mut self, progress: Progress) -> Result<(), Error> {
         /// A pole in the middle of where lags of a few samples have theirs.
         const POLE: f64 = 0.5;
+        /// exp(-1/7): no longer memory than the longest delay. A slower lag follows drift and creep,
+        /// which so few frequencies do not tell from dynamics, and fails on other records.
+        const SLOWEST: f64 = 0.867;
         let Some(point) = self.best().cloned() else { return Ok(()) };
         let longest = point.dynamics.delay;
         for delay in longest.saturating_sub(2)..=longest {
@@ -155,6 +158,15 @@ impl<'a> Search<'a> {
             dynamics.delay = delay;
             lagged.replace_dynamics(dynamics);
             self.offer(lagged, progress)?;
+            let slow = |(refined, _): &(Refined, f64)| {
+                let poles = refined.fitted.point.dynamics.poles();
+                poles.iter().any(|pole| pole.norm() > SLOWEST)
+            };
+            if self.refined.last().is_some_and(slow) {
+                self.refined.pop();
+                self.candidates.pop();
+                self.compare();
+            }
         }
         Ok(())
     }

@@ -65,7 +65,7 @@ impl Uncertainty {
         let largest = values.iter().copied().fold(0.0, f64::max);
         let rank = values.iter().take_while(|&&value| value > IDENTIFIABLE * largest).count();
         let known = vectors.columns(0, rank);
-        let inverse = &known
+        let inverse = known
             * Matrix::from_diagonal(&values.rows(0, rank).map(|v| 1.0 / v))
             * known.transpose();
         let scores = scaled(&scores);

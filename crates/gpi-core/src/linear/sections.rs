@@ -241,7 +241,7 @@ impl Sections {
     }
 
     /// Gives every column of G a largest DC gain of plus or minus one; returns what was divided by.
-    pub(crate) fn to_unit_gain(&mut self) -> Vec<f64> {
+    pub(crate) fn normalize_gain(&mut self) -> Vec<f64> {
         let dc = self.dc_gain();
         let mut gains = Vec::new();
         for input in 0..self.inputs() {
