@@ -133,7 +133,8 @@ def test_records_without_undeclared_effect_come_near_their_noise(
     name = f"record-{number:02d}"
     noise = json.loads((BLIND / "labels.json").read_text())[name]["noise_std_um"]
     again = BLIND / f"{name}.again.csv.gz"
-    error = call(capsys, "identify", BLIND / f"{name}.csv.gz", "--holdout-record", again, "--fit-start")["error"]["holdout"]
+    record = BLIND / f"{name}.csv.gz"
+    error = call(capsys, "identify", record, "--holdout-record", again, "--fit-start")["error"]["holdout"]
     floor = noise * error["nrmse"] / error["rms"]
     show(
         capsys,
