@@ -364,6 +364,26 @@ def deviations_from(refined, names):
     return errors / np.array([p["std"] for p in rows]), 100 * np.abs(weights)
 
 
+def test_the_band_around_a_loop_is_that_of_all_parameters():
+    plant, u = plant_of("complex", seed=7), wander(4000, seed=4)
+    free = {"thresholds": True, "half_widths": True}
+    record = record_of([u], [noisy(plant, u)[0]], plant)
+    described, names = described_by(plant, record, **free)
+    refined = gpi.refine(perturbed(described, names), record, **free)
+    found = values_of(refined)
+    loop = 3.5 * np.sin(np.linspace(0, 3 * np.pi, 151))[:, None]
+
+    def loop_at(name, value):
+        return described.with_values(found | {name: value}).intermediate(loop)[:, 0]
+
+    steps = {name: 1e-6 * max(1.0, abs(value)) for name, value in found.items()}
+    columns = [(loop_at(n, found[n] + h) - loop_at(n, found[n] - h)) / (2 * h) for n, h in steps.items()]
+    jacobian = np.stack(columns, axis=1)
+    covariance = refined.refinement.covariance
+    expected = np.sqrt(np.einsum("ki,ij,kj->k", jacobian, covariance, jacobian))
+    np.testing.assert_allclose(refined.refinement.loop_std(loop)[:, 0], expected, rtol=1e-3, atol=1e-7)
+
+
 def with_outliers(seed):
     """A plant, a record with and without 1 % of its samples 50 standard deviations off, and how many."""
     plant = plant_of("complex", seed=seed)

@@ -131,11 +131,13 @@ impl Uncertainty {
         const FAR_BELOW: f64 = 1e-5;
         let largest = values_of.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let reach = |value: f64| FAR_BELOW * value.abs().max(1e-4 * largest);
+        // Zero for an unknown that is held: rounding must not move it off its place, such as the
+        // threshold zero, on whose two sides the deadzone is another one.
         let scale = self.covariance.diagonal().map(|square| square.max(0.0).sqrt());
-        let scale = scale.map(|value| if value > 0.0 { value } else { 1.0 });
+        let divisor = scale.map(|value| if value > 0.0 { value } else { 1.0 });
         let n = scale.len();
         let correlation =
-            Matrix::from_fn(n, n, |i, j| self.covariance[(i, j)] / (scale[i] * scale[j]));
+            Matrix::from_fn(n, n, |i, j| self.covariance[(i, j)] / (divisor[i] * divisor[j]));
         let (values, vectors) = descending_eigen(correlation);
         let mut variances: Vec<f64> = Vec::new();
         for (axis, &value) in values.iter().enumerate().take_while(|(_, value)| **value > 1e-14) {
