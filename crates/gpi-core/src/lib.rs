@@ -20,9 +20,15 @@
 pub mod operators;
 
 #[cfg(feature = "identify")]
+mod chain;
+#[cfg(feature = "identify")]
+pub mod effects;
+#[cfg(feature = "identify")]
 mod error;
 #[cfg(feature = "identify")]
 pub mod excitation;
+#[cfg(feature = "identify")]
+pub mod explain;
 #[cfg(feature = "identify")]
 pub mod identify;
 #[cfg(feature = "identify")]

@@ -1,5 +1,6 @@
 //! The identified model: one hysteresis per input, then the linear dynamics.
 
+use crate::effects::Effect;
 use crate::linear::StateSpace;
 use crate::operators::{Gpi, GpiState, Operator};
 use crate::{Channel, Error, Matrix, Record};
@@ -22,6 +23,8 @@ pub struct Model {
     hysteresis: Vec<Hysteresis>,
     linear: StateSpace,
     offsets: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) effects: Vec<Effect>,
 }
 
 /// Everything a [`Model`] remembers between two samples.
@@ -31,6 +34,12 @@ pub struct ModelState {
     pub hysteresis: Vec<GpiState<f64, Vec<f64>>>,
     /// The state x of the linear dynamics.
     pub linear: DVector<f64>,
+    /// What each effect remembers.
+    #[serde(default)]
+    pub effects: Vec<Vec<f64>>,
+    /// Samples since the start, from which effects of time count.
+    #[serde(default)]
+    pub sample: usize,
 }
 
 /// How far a simulation is from a measurement, over all outputs and scored samples.
@@ -64,7 +73,8 @@ impl Model {
         offsets: Vec<f64>,
     ) -> Result<Self, Error> {
         let schema = Self::SCHEMA.to_owned();
-        let model = Self { schema, rate, inputs, outputs, hysteresis, linear, offsets };
+        let effects = Vec::new();
+        let model = Self { schema, rate, inputs, outputs, hysteresis, linear, offsets, effects };
         model.validate()?;
         Ok(model)
     }
@@ -75,6 +85,7 @@ impl Model {
         Error::require_equal("inputs", ("names", inputs), ("linear", self.linear.inputs()))?;
         Error::require_equal("outputs", ("names", outputs), ("linear", self.linear.outputs()))?;
         Error::require_equal("outputs", ("names", outputs), ("offsets", self.offsets.len()))?;
+        self.validate_effects()?;
         if self.rate.is_finite() && self.rate > 0.0 {
             Ok(())
         } else {
@@ -130,10 +141,18 @@ impl Model {
             *v = hysteresis.step(&mut state, value);
             states.push(state);
         }
-        Ok(ModelState { hysteresis: states, linear: self.linear.equilibrium(&driven) })
+        let mut state = ModelState {
+            hysteresis: states,
+            linear: self.linear.equilibrium(&driven),
+            effects: Vec::new(),
+            sample: 0,
+        };
+        self.rest_effects(&mut state, input, &driven);
+        Ok(state)
     }
 
-    /// The intermediate signals v (samples, inputs) of an input (samples, inputs); `states` move on.
+    /// The intermediate signals v (samples, inputs) of a drive (samples, inputs) that has passed the
+    /// input stage; `states` move on.
     ///
     /// # Errors
     /// Another number of channels or states than inputs.
@@ -148,8 +167,8 @@ impl Model {
         let mut v = input.clone();
         let samples = input.nrows();
         let columns = v.as_mut_slice().chunks_exact_mut(samples.max(1));
-        for ((hysteresis, state), column) in self.hysteresis.iter().zip(states).zip(columns) {
-            hysteresis.in_place(state, column);
+        for ((place, state), column) in states.iter_mut().enumerate().zip(columns) {
+            self.play_from(place, state, column)?;
         }
         Ok(v)
     }
@@ -160,8 +179,31 @@ impl Model {
     /// # Errors
     /// Another number of channels than inputs.
     pub fn simulate_from(&self, state: &mut ModelState, input: &Matrix) -> Result<Matrix, Error> {
-        let v = self.intermediate_from(&mut state.hysteresis, input)?;
-        let mut output = self.linear.simulate_from(&mut state.linear, &v)?;
+        self.simulate_with(state, input, &Matrix::zeros(input.nrows(), 0))
+    }
+
+    /// The same with other measured columns (samples, covariates), which an effect may let leak in; a
+    /// column that is not there counts as zero.
+    ///
+    /// # Errors
+    /// Another number of channels than inputs, columns of another length.
+    pub fn simulate_with(
+        &self,
+        state: &mut ModelState,
+        input: &Matrix,
+        covariates: &Matrix,
+    ) -> Result<Matrix, Error> {
+        let (inputs, samples) = (self.hysteresis.len(), input.nrows());
+        Error::require_equal("channels", ("input", input.ncols()), ("hysteresis", inputs))?;
+        let rows = ("covariates", covariates.nrows());
+        Error::require_equal("samples", ("input", samples), rows)?;
+        let drive = self.drive_from(state, input);
+        let v = self.intermediate_from(&mut state.hysteresis, &drive)?;
+        let mut output = self.respond_from(state, &v)?;
+        if samples > 0 {
+            self.read_from(state, &mut output, covariates);
+        }
+        state.sample += samples;
         for (mut column, offset) in output.column_iter_mut().zip(&self.offsets) {
             column.add_scalar_mut(*offset);
         }
@@ -182,7 +224,9 @@ impl Model {
     /// # Errors
     /// No sample, another number of channels than inputs.
     pub fn intermediate(&self, input: &Matrix) -> Result<Matrix, Error> {
-        self.intermediate_from(&mut self.start_of(input)?.hysteresis, input)
+        let mut state = self.start_of(input)?;
+        let drive = self.drive_from(&mut state, input);
+        self.intermediate_from(&mut state.hysteresis, &drive)
     }
 
     fn start_of(&self, input: &Matrix) -> Result<ModelState, Error> {
@@ -200,7 +244,10 @@ impl Model {
     pub fn residuals(&self, record: &Record) -> Result<Vec<Matrix>, Error> {
         let outputs = ("record's outputs", record.outputs().len());
         Error::require_equal("outputs", outputs, ("model's outputs", self.outputs.len()))?;
-        let residual = |e: &crate::Experiment| Ok(&e.output - self.simulate(&e.input)?);
+        let residual = |e: &crate::Experiment| {
+            let mut state = self.start_of(&e.input)?;
+            Ok(&e.output - self.simulate_with(&mut state, &e.input, &e.covariates)?)
+        };
         record.experiments().iter().map(residual).collect()
     }
 
@@ -263,11 +310,11 @@ impl SimulationError {
         for output in 0..record.outputs().len() {
             let (mut low, mut high, mut sum) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
             for (experiment, residual) in record.experiments().iter().zip(residuals) {
-                let rows = experiment.output.nrows() - experiment.warmup;
-                let residual = residual.view((experiment.warmup, output), (rows, 1));
-                let measured = experiment.output.view((experiment.warmup, output), (rows, 1));
-                let mean = if remove_mean { residual.mean() } else { 0.0 };
-                for (&error, &value) in residual.iter().zip(measured.iter()) {
+                let places = || experiment.scored_runs().flatten();
+                let total: f64 = places().map(|k| residual[(k, output)]).sum();
+                let mean = if remove_mean { total / experiment.scored() as f64 } else { 0.0 };
+                for k in places() {
+                    let (error, value) = (residual[(k, output)], experiment.output[(k, output)]);
                     squares += (error - mean).powi(2);
                     max = max.max((error - mean).abs());
                     (low, high, sum) = (low.min(value), high.max(value), sum + value);
@@ -276,7 +323,7 @@ impl SimulationError {
             let mean = sum / count;
             for experiment in record.experiments() {
                 let measured = experiment.output.column(output);
-                let scored = measured.iter().skip(experiment.warmup);
+                let scored = experiment.scored_runs().flatten().map(|k| measured[k]);
                 variation += scored.map(|value| (value - mean).powi(2)).sum::<f64>();
             }
             span_squares += (high - low).powi(2);
@@ -353,6 +400,7 @@ mod tests {
             output: Matrix::from_column_slice(4, 1, &[9.0, 0.0, 2.0, 4.0]),
             covariates: Matrix::zeros(4, 0),
             warmup: 1,
+            held_out: vec![],
         };
         let record = Record::new(vec![run], 1.0, channel("u"), channel("y"), vec![]).unwrap();
         let residual = [Matrix::from_column_slice(4, 1, &[100.0, 1.0, 1.0, 1.0])];

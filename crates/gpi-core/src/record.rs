@@ -1,6 +1,7 @@
 //! Measured records: what was driven, what was measured, when, and in which units.
 
 use crate::{Error, Matrix};
+use std::ops::Range;
 
 /// Name and unit of a column; the unit is a label that results carry along.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -38,6 +39,9 @@ pub struct Experiment {
     pub covariates: Matrix,
     /// Samples at the start that drive the model but are not scored: its run-in.
     pub warmup: usize,
+    /// Samples that drive the model but are not scored because they are kept for a test: ascending,
+    /// apart from each other, behind the run-in.
+    pub held_out: Vec<Range<usize>>,
 }
 
 /// Experiments of one actuator at one sampling rate.
@@ -61,6 +65,7 @@ impl Record {
     ///     output: 2.0 * &signal,
     ///     covariates: Matrix::zeros(10, 0),
     ///     warmup: 0,
+    ///     held_out: vec![],
     /// };
     /// let record = Record::new(
     ///     vec![run], 1000.0, vec![Channel::new("u", "V")], vec![Channel::new("y", "um")], vec![],
@@ -98,10 +103,19 @@ impl Record {
                 Error::require_equal("channels", columns, ("channel names", channels.len()))?;
                 require_finite(matrix, channels)?;
             }
-            if experiment.warmup >= rows {
+            if experiment.warmup >= rows || experiment.scored() == 0 {
                 let purpose = format!("a warm-up of {} samples and one more", experiment.warmup);
                 let needed = experiment.warmup + 1;
                 return Err(Error::TooFewSamples { samples: rows, needed, purpose });
+            }
+            let mut end = experiment.warmup;
+            for held in &experiment.held_out {
+                if held.start < end || held.end <= held.start || held.end > rows {
+                    let requirement =
+                        format!("ascending ranges between {} and {rows}", experiment.warmup);
+                    return Err(Error::parameter("held_out", format!("{held:?}"), requirement));
+                }
+                end = held.end;
             }
         }
         for (name, channels) in [("inputs", &inputs), ("outputs", &outputs)] {
@@ -142,9 +156,33 @@ impl Record {
         self.experiments.iter().map(|experiment| experiment.input.nrows()).sum()
     }
 
-    /// Samples that are scored: all but the warm-ups.
+    /// Samples that are scored: all but the warm-ups and what is held out.
     pub fn scored(&self) -> usize {
-        self.samples() - self.experiments.iter().map(|experiment| experiment.warmup).sum::<usize>()
+        self.experiments.iter().map(Experiment::scored).sum()
+    }
+
+    /// Every scored run as an experiment of its own, with up to `lead` samples before it as its warm-up.
+    ///
+    /// # Errors
+    /// As for [`Record::new`].
+    pub(crate) fn pieces(&self, lead: usize) -> Result<Self, Error> {
+        let whole = |e: &Experiment| e.held_out.is_empty();
+        if self.experiments.iter().all(whole) {
+            return Ok(self.clone());
+        }
+        let piece = |experiment: &Experiment, run: Range<usize>| {
+            let first = if whole(experiment) { 0 } else { run.start.saturating_sub(lead) };
+            let rows = |matrix: &Matrix| matrix.rows(first, run.end - first).into_owned();
+            Experiment {
+                input: rows(&experiment.input),
+                output: rows(&experiment.output),
+                covariates: rows(&experiment.covariates),
+                warmup: run.start - first,
+                held_out: Vec::new(),
+            }
+        };
+        let runs = |e: &Experiment| e.scored_runs().map(|run| piece(e, run)).collect::<Vec<_>>();
+        self.with_experiments(self.experiments.iter().flat_map(runs).collect())
     }
 
     /// The same channels and rate with other experiments, which were cut from this record.
@@ -206,7 +244,29 @@ impl Experiment {
             output: self.output.rows(0, count).into_owned(),
             covariates: self.covariates.rows(0, count).into_owned(),
             warmup: self.warmup,
+            held_out: Vec::new(),
         }
+    }
+
+    /// How many samples are scored.
+    pub fn scored(&self) -> usize {
+        self.scored_runs().map(|run| run.len()).sum()
+    }
+
+    /// Runs of scored samples.
+    pub fn scored_runs(&self) -> impl Iterator<Item = Range<usize>> {
+        let starts = std::iter::once(self.warmup).chain(self.held_out.iter().map(|held| held.end));
+        let rows = self.input.nrows();
+        let ends = self.held_out.iter().map(|held| held.start).chain(std::iter::once(rows));
+        starts.zip(ends).filter(|(start, end)| start < end).map(|(start, end)| start..end)
+    }
+
+    /// The scored rows of a signal (samples, channels), run by run.
+    pub(crate) fn scored_rows<'a>(
+        &self,
+        signal: &'a Matrix,
+    ) -> impl Iterator<Item = nalgebra::DMatrixView<'a, f64>> {
+        self.scored_runs().map(|run| signal.rows(run.start, run.len()))
     }
 }
 

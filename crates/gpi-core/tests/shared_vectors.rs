@@ -100,7 +100,13 @@ fn fir() {
             let input = matrix(&run["input"]);
             let covariates = Matrix::zeros(input.nrows(), 0);
             let warmup = run["warmup"].as_u64().unwrap() as usize;
-            Experiment { input, output: matrix(&run["output"]), covariates, warmup }
+            Experiment {
+                input,
+                output: matrix(&run["output"]),
+                covariates,
+                warmup,
+                held_out: vec![],
+            }
         });
         let runs: Vec<_> = runs.collect();
         let names =

@@ -148,6 +148,7 @@ fn fir(
         input,
         output,
         warmup: 0,
+        held_out: vec![],
     });
     let record = gpi_core::Record::new(runs.collect(), 1.0, u_channels, y_channels, vec![]);
     let record = record.map_err(to_python)?;

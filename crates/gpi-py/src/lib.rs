@@ -4,6 +4,7 @@
 mod arrays;
 mod errors;
 mod excitation;
+mod explain;
 mod fir;
 mod identification;
 mod identify;
@@ -30,5 +31,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     identification::register(module)?;
     identify::register(module)?;
     refine::register(module)?;
+    explain::register(module)?;
     excitation::register(module)
 }

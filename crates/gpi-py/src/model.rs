@@ -34,20 +34,43 @@ impl Model {
         }
     }
 
-    /// A state as one vector: previous input and plays of every input, then x.
+    /// A state as one vector: previous input and plays of every input, x, what the effects remember, and
+    /// how many samples have gone.
     fn write(state: &ModelState) -> Vec<f64> {
         let plays = state.hysteresis.iter().flat_map(write_state);
-        plays.chain(state.linear.iter().copied()).collect()
+        let values = plays.chain(state.linear.iter().copied());
+        if state.effects.is_empty() {
+            return values.collect();
+        }
+        // what an effect remembers, after how much it is
+        let sized = |memory: &Vec<f64>| [&[memory.len() as f64], &memory[..]].concat();
+        let effects = state.effects.iter().flat_map(sized);
+        values.chain(effects).chain(std::iter::once(state.sample as f64)).collect()
     }
 
     fn read(&self, values: &[f64]) -> PyResult<ModelState> {
         let sizes: Vec<usize> =
             self.model.hysteresis().iter().map(|h| 1 + h.plays().weights().len()).collect();
         let expected = sizes.iter().sum::<usize>() + self.model.linear().order();
-        if values.len() != expected {
-            let message =
-                format!("`state` has {} elements, but {expected} are needed", values.len());
-            return Err(parameter(message));
+        let (values, mut others) = values.split_at(expected.min(values.len()));
+        let found = values.len() + others.len();
+        let wrong =
+            || parameter(format!("`state` has {found} elements, but {expected} are needed"));
+        let mut effects = Vec::new();
+        for _ in self.model.effects() {
+            let (&size, rest) = others.split_first().ok_or_else(wrong)?;
+            let (own, rest) = rest.split_at_checked(size as usize).ok_or_else(wrong)?;
+            effects.push(own.to_vec());
+            others = rest;
+        }
+        let mut sample = 0;
+        if !effects.is_empty()
+            && let Some((&last, rest)) = others.split_first()
+        {
+            (sample, others) = (last as usize, rest);
+        }
+        if values.len() != expected || !others.is_empty() {
+            return Err(wrong());
         }
         let mut rest = values;
         let mut hysteresis = Vec::new();
@@ -56,7 +79,8 @@ impl Model {
             hysteresis.push(read_state(operator, own)?);
             rest = others;
         }
-        Ok(ModelState { hysteresis, linear: DVector::from_column_slice(rest) })
+        let linear = DVector::from_column_slice(rest);
+        Ok(ModelState { hysteresis, linear, effects, sample })
     }
 }
 

@@ -117,6 +117,7 @@ impl Record {
                 output,
                 covariates,
                 warmup,
+                held_out: vec![],
             })
             .collect();
         let record = gpi_core::Record::new(experiments, rate, inputs, outputs, others);

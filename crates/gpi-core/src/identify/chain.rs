@@ -6,7 +6,8 @@ use super::point::range;
 use super::preparation::Prepared;
 use super::quasi_static;
 use super::sensitivity::Parameters;
-use super::structure::Search;
+use super::refine::Refined;
+use super::structure::{Candidate, Search};
 use super::{Grid, Progress, report};
 use crate::linear::{Fir, excitation_limit};
 use crate::{Error, Record};
@@ -25,7 +26,40 @@ pub fn identify(
     options: &IdentifyOptions,
     progress: Progress,
 ) -> Result<Identification, Error> {
+    let mut prepared = prepare(record, options)?;
+    let found = compare(&mut prepared, options, false, progress)?;
+    finish(&prepared, found, progress)
+}
+
+/// The structures that were compared on a prepared record.
+pub(crate) struct Compared {
+    /// The place of the best candidate.
+    pub chosen: usize,
+    pub refined: Refined,
+    pub candidates: Vec<Candidate>,
+    quasi_static: bool,
+    stages: (Option<Fir>, Vec<f64>, usize, Vec<Round>),
+    supported: usize,
+}
+
+/// Makes a record ready, on the given or usual grids.
+pub(crate) fn prepare<'a>(
+    record: &'a Record,
+    options: &IdentifyOptions,
+) -> Result<Prepared<'a>, Error> {
     record.require_moving()?;
+    let grid = options.half_widths.clone().unwrap_or(Grid::Count(24));
+    Prepared::new(record, channels(record, options, &grid)?)
+}
+
+/// Seeds and compares structures; `fast` rules slow poles out.
+pub(crate) fn compare(
+    prepared: &mut Prepared,
+    options: &IdentifyOptions,
+    fast: bool,
+    progress: Progress,
+) -> Result<Compared, Error> {
+    let record = prepared.given;
     let inputs = record.inputs().len();
     let supported = excitation_limit(record)?;
     if options.taps == Some(0) {
@@ -38,11 +72,9 @@ pub fn identify(
         return Err(Error::Excitation { taps, unknowns, rank, supported });
     }
     report(progress, "excitation", 1.0)?;
-    let longest =
-        record.experiments().iter().map(|e| e.input.nrows() - e.warmup).max().unwrap_or(0);
+    let longest = record.experiments().iter().map(crate::Experiment::scored).max().unwrap_or(0);
     let affordable = (longest / (4 * inputs)).max(1);
     let grid = options.half_widths.clone().unwrap_or(Grid::Count(24));
-    let mut prepared = Prepared::new(record, channels(record, options, &grid)?)?;
     let sizes = prepared.channels.iter().map(|c| c.half_widths.len() + c.slopes.len() - 1);
     let needed = sizes.sum::<usize>() + record.outputs().len();
     if record.scored() < needed {
@@ -59,8 +91,8 @@ pub fn identify(
             );
             return Err(Error::parameter("order", order, requirement));
         }
-        let (points, rounds) = quasi_static::seeds(&prepared, options.delay, progress)?;
-        let mut search = Search::new(&prepared, options);
+        let (points, rounds) = quasi_static::seeds(prepared, options.delay, progress)?;
+        let mut search = Search::new(prepared, options);
         // A rich hysteresis hides a sample of delay; a simple one beside it may tell.
         for point in &points {
             search.climb(point, progress)?;
@@ -69,13 +101,14 @@ pub fn identify(
             search.lag(progress)?;
         }
         let stages = (None, Vec::new(), 0, rounds);
-        return finish(&prepared, search, true, stages, supported, progress);
+        return compared(search, true, stages, supported);
     }
     let largest = (1200 / inputs).min(1024).min(supported).min(affordable);
     let count = options.taps.unwrap_or(largest.min(400));
     let mut taps = Taps { count, largest: options.taps.unwrap_or(largest) };
-    let seed = dynamic::seed(&mut prepared, &grid, &mut taps, options.order, progress)?;
-    let mut search = Search::new(&prepared, options);
+    let seed = dynamic::seed(prepared, &grid, &mut taps, options.order, progress)?;
+    let mut search = Search::new(prepared, options);
+    search.fast = fast;
     search.climb(&seed.point, progress)?;
     if options.order.is_none() {
         let mut quiet = |_: &str, _: f64| true;
@@ -85,7 +118,19 @@ pub fn identify(
         search.orders(&mut dynamics, progress)?;
     }
     let stages = (Some(seed.fir), seed.singular_values, seed.reflected, seed.rounds);
-    finish(&prepared, search, false, stages, supported, progress)
+    compared(search, false, stages, supported)
+}
+
+fn compared(
+    search: Search,
+    quasi_static: bool,
+    stages: (Option<Fir>, Vec<f64>, usize, Vec<Round>),
+    supported: usize,
+) -> Result<Compared, Error> {
+    let Some((chosen, refined, candidates)) = search.finish() else {
+        return Err(Error::parameter("half_widths", "none", "at least one structure is tried"));
+    };
+    Ok(Compared { chosen, refined, candidates, quasi_static, stages, supported })
 }
 
 /// The hysteresis that the rounds start from: the identity on the given or usual grids.
@@ -107,15 +152,11 @@ fn channels(
 /// The best structure's model and what it rests on.
 fn finish(
     prepared: &Prepared,
-    search: Search,
-    quasi_static: bool,
-    (fir, singular_values, reflected, rounds): (Option<Fir>, Vec<f64>, usize, Vec<Round>),
-    supported_taps: usize,
+    found: Compared,
     progress: Progress,
 ) -> Result<Identification, Error> {
-    let Some((chosen, mut refined, candidates)) = search.finish() else {
-        return Err(Error::parameter("half_widths", "none", "at least one structure is tried"));
-    };
+    let Compared { chosen, mut refined, candidates, quasi_static, stages, supported } = found;
+    let ((fir, singular_values, reflected, rounds), supported_taps) = (stages, supported);
     refined.drop_undetermined(prepared, progress)?;
     let refinement = refined.finish(prepared, progress)?;
     let mut notes = prepared.notes.clone();

@@ -5,7 +5,7 @@ use nalgebra::DVector;
 
 /// `e(k) = sum_i a_i e(k-i) + w(k)` for each output, with w white but correlated between outputs.
 #[derive(Clone, Debug)]
-pub(super) struct Colour {
+pub(crate) struct Colour {
     /// a_1, a_2, .. of each output.
     pub coefficients: Vec<Vec<f64>>,
     /// Covariance of w, (outputs, outputs).
@@ -15,14 +15,13 @@ pub(super) struct Colour {
 impl Colour {
     /// Fits orders up to 30 by Levinson and Durbin's recursion to the scored samples; each output takes
     /// the order with the least Bayesian information criterion.
-    pub(super) fn of(residuals: &[Matrix], record: &Record) -> Self {
+    pub(crate) fn of(residuals: &[Matrix], record: &Record) -> Self {
         const LONGEST: usize = 30;
         let outputs = residuals[0].ncols();
         let samples = record.scored();
         let scored = || {
-            residuals.iter().zip(record.experiments()).map(|(residual, experiment)| {
-                residual.rows(experiment.warmup, residual.nrows() - experiment.warmup)
-            })
+            let pairs = residuals.iter().zip(record.experiments());
+            pairs.flat_map(|(residual, experiment)| experiment.scored_rows(residual))
         };
         let longest = LONGEST.min(samples / 20);
         let coefficients: Vec<Vec<f64>> = (0..outputs)

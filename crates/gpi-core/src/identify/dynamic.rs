@@ -17,14 +17,14 @@ const RIDGE: f64 = 3e-2;
 
 /// Taps of the FIR estimates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Taps {
+pub(crate) struct Taps {
     pub count: usize,
     /// As many as the record can afford, should the slowest pole need them.
     pub largest: usize,
 }
 
 /// Where the joint refinement starts from.
-pub(super) struct Seed {
+pub(crate) struct Seed {
     pub point: Point,
     /// The paper's first stage, u to y.
     pub fir: Fir,
@@ -35,7 +35,7 @@ pub(super) struct Seed {
 }
 
 /// Hysteresis and dynamics in turn.
-pub(super) fn seed(
+pub(crate) fn seed(
     prepared: &mut Prepared,
     half_widths: &Grid,
     taps: &mut Taps,
@@ -48,7 +48,7 @@ pub(super) fn seed(
     /// A round that lowers the rms by less than this fraction is the last one.
     const GAIN: f64 = 5e-3;
     let mut current = dynamics_of(&prepared.record, taps, order, progress)?;
-    let fir = linear::estimate(&prepared.record, taps.count, 0.0)?;
+    let fir = linear::estimate(&prepared.record.pieces(taps.count)?, taps.count, 0.0)?;
     let mut rounds = Vec::new();
     let mut point = prepared.point(current.sections()?);
     let linear_alone = prepared.free_run(&mut point)?;
@@ -98,13 +98,14 @@ pub(super) fn seed(
 }
 
 /// G of a record whose input is v, with as many taps as its slowest pole needs.
-pub(super) fn dynamics_of(
+pub(crate) fn dynamics_of(
     record: &Record,
     taps: &mut Taps,
     order: Option<usize>,
     progress: Progress,
 ) -> Result<Dynamics, Error> {
     let mut check = || report(progress, "dynamics", 0.0);
+    let record = &record.pieces(taps.largest)?;
     let found = dynamics::estimate(record, taps.count, RIDGE, order, &mut check)?;
     // taps until the slowest pole has decayed to one percent
     let radius = found.refit.system.spectral_radius()?;

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 /// G, and how it explains y from v.
 #[derive(Clone)]
-pub(super) struct Dynamics {
+pub(crate) struct Dynamics {
     /// ERA's singular values, and the poles it reflected.
     pub singular_values: Vec<f64>,
     pub reflected: usize,
@@ -15,14 +15,14 @@ pub(super) struct Dynamics {
 
 impl Dynamics {
     /// G in the form that is refined.
-    pub(super) fn sections(&self) -> Result<Sections, Error> {
+    pub(crate) fn sections(&self) -> Result<Sections, Error> {
         Sections::from_state_space(&self.refit.system, 0)
     }
 }
 
 /// C, D, offsets and free responses fitted to y with the poles kept.
 #[derive(Clone)]
-pub(super) struct Refit {
+pub(crate) struct Refit {
     pub system: StateSpace,
     /// Root mean square over all outputs.
     pub rms: f64,
@@ -31,7 +31,7 @@ pub(super) struct Refit {
 
 /// Estimates G from a record whose input is v. ERA gives the poles of each candidate order, least
 /// squares on y the zeros; the order is the one with the least Bayesian information criterion.
-pub(super) fn estimate(
+pub(crate) fn estimate(
     record: &Record,
     taps: usize,
     ridge: f64,
@@ -88,7 +88,7 @@ pub(super) fn estimate(
 }
 
 /// Fits C, D, an offset and a free response for each output by least squares, A and B kept.
-pub(super) fn refit(record: &Record, system: StateSpace) -> Result<Refit, Error> {
+pub(crate) fn refit(record: &Record, system: StateSpace) -> Result<Refit, Error> {
     const BLOCK: usize = 1024;
     let (order, inputs, outputs) = (system.order(), system.inputs(), system.outputs());
     let count = record.experiments().len();

@@ -3,10 +3,9 @@
 use super::Progress;
 use super::levenberg_marquardt::{Fitted, fit};
 use super::point::DynamicsFreedom;
-use super::preparation::{Prepared, rescale};
+use super::preparation::Prepared;
 use super::refine::{RefineOptions, require_match, settings};
 use super::sensitivity::Parameters;
-use crate::linear::Sections;
 use crate::{Error, Matrix, Model, Record};
 
 /// Measured minus simulated outputs of each experiment, (samples, outputs), where the start of
@@ -27,8 +26,7 @@ pub fn residuals_from_fitted_start(
     require_match(model, record)?;
     let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
     let prepared = Prepared::scoring_all(record, channels)?;
-    let mut point = prepared.point(Sections::from_delayed_state_space(model.linear())?);
-    rescale(&mut point);
+    let mut point = prepared.point_of(model)?;
     for offsets in &mut point.offsets {
         for (output, mut column) in offsets.column_iter_mut().enumerate() {
             column.fill(model.offsets()[output] - prepared.means[output]);

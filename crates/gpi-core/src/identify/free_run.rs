@@ -1,49 +1,202 @@
-//! A point run free over the record, and the model that it is.
+//! A point run free over the record, stage by stage, and the model that it is.
 
 use super::point::{Past, Point};
-use super::sensitivity::Parameters;
+use super::sensitivity::{Beside, Parameters};
 use super::stream::hats;
+use crate::effects::{Effect, Moment, Slope, Stage};
 use crate::linear::Sections;
-use crate::{Error, Matrix, Model, Record};
+use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::{DVector, RowDVector};
 
 impl Point {
     /// Other dynamics, which stood still before the record.
-    pub(super) fn replace_dynamics(&mut self, dynamics: Sections) {
+    pub(crate) fn replace_dynamics(&mut self, dynamics: Sections) {
         for past in &mut self.pasts {
             past.state = DVector::zeros(dynamics.order());
         }
         self.dynamics = dynamics;
     }
 
-    /// The intermediate signals v (samples, inputs) of an experiment's input.
-    pub(super) fn intermediate(&self, input: &Matrix, past: &Past) -> Matrix {
-        let mut v = input.clone();
-        let columns = v.as_mut_slice().chunks_exact_mut(input.nrows());
+    /// Effects on the plays of an input.
+    pub(crate) fn beside(&self, input: usize) -> Beside<'_> {
+        let own = self.at_stage(Stage::Plays).map(Effect::block);
+        Beside { blocks: own.filter(|block| block.channel() == input).collect(), rate: self.rate }
+    }
+
+    /// The drive (samples, inputs) that reaches the hysteresis.
+    pub(crate) fn drive(&self, experiment: &Experiment) -> Matrix {
+        let mut drive = experiment.input.clone();
+        for effect in self.at_stage(Stage::Input) {
+            let block = effect.block();
+            let mut column = drive.column_mut(block.channel());
+            let mut state = block.rest(column[0], self.moment(0, &[]));
+            for (k, value) in column.iter_mut().enumerate() {
+                *value = block.drive(&mut state, *value, self.moment(k, &[]));
+            }
+        }
+        drive
+    }
+
+    pub(crate) fn moment<'a>(&self, k: usize, covariates: &'a [f64]) -> Moment<'a> {
+        Moment { time: k as f64 / self.rate, rate: self.rate, covariates }
+    }
+
+    /// The intermediate signals v (samples, inputs) of a drive.
+    pub(crate) fn intermediate(&self, drive: &Matrix, past: &Past) -> Matrix {
+        let mut v = drive.clone();
+        let columns = v.as_mut_slice().chunks_exact_mut(drive.nrows());
         for ((input, channel), column) in self.channels.iter().enumerate().zip(columns) {
-            channel.apply(past.plays.as_ref().map(|plays| &plays[input][..]), column);
+            let start = past.plays.as_ref().map(|plays| &plays[input][..]);
+            channel.apply(start, &self.beside(input), column);
         }
         v
     }
 
-    /// Measured minus simulated outputs of each experiment, (samples, outputs), warm-ups included.
-    pub(super) fn residuals(&self, record: &Record) -> Result<Vec<Matrix>, Error> {
+    /// What the dynamics make of v, (samples, outputs), before the output stage.
+    pub(crate) fn displacement(
+        &self,
+        v: &Matrix,
+        experiment: &Experiment,
+        past: &Past,
+    ) -> Result<Matrix, Error> {
         let linear = self.dynamics.to_state_space()?;
         let delayed = linear.order() - self.dynamics.order();
-        let runs = record.experiments().iter().zip(&self.pasts).zip(&self.offsets);
-        runs.map(|((experiment, past), offsets)| {
-            let samples = experiment.input.nrows();
-            let v = self.intermediate(&experiment.input, past);
-            let mut state = linear.equilibrium(&v.row(0).transpose());
-            let mut residual = &experiment.output - linear.simulate_from(&mut state, &v)?;
-            let mut free = DVector::zeros(linear.order());
-            free.rows_mut(delayed, past.state.len()).copy_from(&past.state);
-            for k in 0..samples {
-                if past.moving && k >= experiment.warmup {
-                    let mut row = residual.row_mut(k);
-                    row -= (linear.c() * &free).transpose();
-                    free = linear.a() * free;
+        let mut state = linear.equilibrium(&v.row(0).transpose());
+        let mut displacement = linear.simulate_from(&mut state, v)?;
+        let loops: Vec<_> = self.loops().collect();
+        if !past.moving && loops.is_empty() {
+            return Ok(displacement);
+        }
+        // What the start and the feedback add evolves by itself.
+        let mut free = DVector::zeros(linear.order());
+        for k in 0..v.nrows() {
+            if k == experiment.warmup && past.moving {
+                let mut own = free.rows_mut(delayed, past.state.len());
+                own += &past.state;
+            }
+            let mut row = displacement.row_mut(k);
+            row += (linear.c() * &free).transpose();
+            free = linear.a() * free;
+            for effect in &loops {
+                let drives = effect.block().feedback(displacement[(k, effect.block().channel())]);
+                for (state, (drive, _)) in drives.into_iter().enumerate() {
+                    free[delayed + state] += drive;
                 }
+            }
+        }
+        Ok(displacement)
+    }
+
+    /// Effects that feed the displacement back.
+    pub(crate) fn loops(&self) -> impl Iterator<Item = &Effect> {
+        self.at_stage(Stage::Dynamics).filter(|effect| !effect.block().feedback(0.0).is_empty())
+    }
+
+    /// Takes a displacement (samples, outputs) through the output stage.
+    pub(crate) fn sense(&self, displacement: &mut Matrix) {
+        for effect in self.at_stage(Stage::Output) {
+            let block = effect.block();
+            let mut column = displacement.column_mut(block.channel());
+            let mut state = block.rest(column[0], self.moment(0, &[]));
+            for (k, value) in column.iter_mut().enumerate() {
+                *value = block.sense(&mut state, *value, self.moment(k, &[])).0;
+            }
+        }
+    }
+
+    /// Adds what the input does not drive.
+    pub(crate) fn add(&self, experiment: &Experiment, output: &mut Matrix) {
+        for effect in self.at_stage(Stage::Added) {
+            let block = effect.block();
+            let rows = experiment.covariates.transpose();
+            let covariates = |k: usize| {
+                let width = rows.nrows();
+                &rows.as_slice()[k * width..(k + 1) * width]
+            };
+            let mut state = block.rest(0.0, self.moment(0, covariates(0)));
+            for (k, value) in output.column_mut(block.channel()).iter_mut().enumerate() {
+                *value += block.add(&mut state, self.moment(k, covariates(k)));
+            }
+        }
+    }
+
+    /// The signals along the chain.
+    pub(crate) fn signals(&self, experiment: &Experiment, index: usize) -> Result<Signals, Error> {
+        let past = &self.pasts[index];
+        let drive = self.drive(experiment);
+        let intermediate = self.intermediate(&drive, past);
+        let displacement = self.displacement(&intermediate, experiment, past)?;
+        Ok(Signals { drive, intermediate, displacement })
+    }
+
+    /// The output (samples, outputs) without its offsets, from the stage on at which `known` ends.
+    pub(crate) fn output_from(
+        &self,
+        stage: Stage,
+        known: &Signals,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Matrix, Error> {
+        let past = &self.pasts[index];
+        let mut output = match stage {
+            Stage::Input => {
+                let v = self.intermediate(&self.drive(experiment), past);
+                self.displacement(&v, experiment, past)?
+            }
+            Stage::Plays => {
+                let v = self.intermediate(&known.drive, past);
+                self.displacement(&v, experiment, past)?
+            }
+            Stage::Dynamics => self.displacement(&known.intermediate, experiment, past)?,
+            Stage::Output | Stage::Added | Stage::Noise => known.displacement.clone(),
+        };
+        self.sense(&mut output);
+        self.add(experiment, &mut output);
+        Ok(output)
+    }
+
+    /// Derivatives of the output by the values of every effect that is not a section: `[effect][value]`,
+    /// (samples, outputs), from differences.
+    pub(crate) fn effect_columns(
+        &self,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Vec<Vec<Matrix>>, Error> {
+        if self.effects.is_empty() {
+            return Ok(Vec::new());
+        }
+        let known = self.signals(experiment, index)?;
+        let here = self.output_from(Stage::Added, &known, experiment, index)?;
+        let mut columns = Vec::new();
+        for (place, effect) in self.effects.iter().enumerate() {
+            let block = effect.block();
+            let sections = !block.sections(self.rate).is_empty();
+            let mut own = Vec::new();
+            for (number, step) in block.steps().into_iter().enumerate() {
+                if sections {
+                    break;
+                }
+                let mut values = block.values();
+                values[number] += step;
+                let mut moved = self.clone();
+                moved.effects[place].block_mut().set(&values);
+                let there = moved.output_from(block.stage(), &known, experiment, index)?;
+                own.push((there - &here) / step);
+            }
+            columns.push(own);
+        }
+        Ok(columns)
+    }
+
+    /// Measured minus simulated outputs of each experiment, (samples, outputs), warm-ups included.
+    pub(crate) fn residuals(&self, record: &Record) -> Result<Vec<Matrix>, Error> {
+        let runs = record.experiments().iter().zip(&self.offsets).enumerate();
+        runs.map(|(index, (experiment, offsets))| {
+            let samples = experiment.input.nrows();
+            let known = self.signals(experiment, index)?;
+            let output = self.output_from(Stage::Added, &known, experiment, index)?;
+            let mut residual = &experiment.output - output;
+            for k in 0..samples {
                 for (knot, weight) in hats(k, samples, offsets.nrows()) {
                     let mut row = residual.row_mut(k);
                     row -= weight * offsets.row(knot);
@@ -55,7 +208,7 @@ impl Point {
     }
 
     /// The mean additive term of each output, experiments counted by their scored samples.
-    pub(super) fn mean_offsets(&self, record: &Record) -> RowDVector<f64> {
+    pub(crate) fn mean_offsets(&self, record: &Record) -> RowDVector<f64> {
         let scored = record.scored() as f64;
         let parts = record.experiments().iter().zip(&self.offsets).map(|(e, knots)| {
             // the mean of a piecewise linear function: the end knots count half
@@ -64,13 +217,13 @@ impl Point {
             let total: f64 = (0..n).map(weight).sum();
             let rows = (0..n).map(|knot| knots.row(knot) * (weight(knot) / total));
             rows.fold(RowDVector::zeros(knots.ncols()), |sum, row| sum + row)
-                * ((e.input.nrows() - e.warmup) as f64 / scored)
+                * (e.scored() as f64 / scored)
         });
         parts.fold(RowDVector::zeros(self.dynamics.outputs()), |sum, part| sum + part)
     }
 
     /// The model, with the channels of the record `given`; `means` were taken from its outputs.
-    pub(super) fn to_model(
+    pub(crate) fn to_model(
         &self,
         given: &Record,
         record: &Record,
@@ -80,7 +233,56 @@ impl Point {
         let (inputs, outputs) = (given.inputs().to_vec(), given.outputs().to_vec());
         let rest = self.mean_offsets(record);
         let offsets = means.iter().zip(rest.iter()).map(|(mean, rest)| mean + rest);
-        let linear = self.dynamics.to_state_space()?;
-        Model::new(given.rate(), inputs, outputs, hysteresis?, linear, offsets.collect())
+        let linear = self.dynamics.own().to_state_space()?;
+        let model =
+            Model::new(given.rate(), inputs, outputs, hysteresis?, linear, offsets.collect())?;
+        model.with_effects(self.blocks())
+    }
+}
+
+/// Signals along the chain, each (samples, channels).
+pub(crate) struct Signals {
+    /// The input as it reaches the hysteresis.
+    pub drive: Matrix,
+    /// v.
+    pub intermediate: Matrix,
+    /// What the dynamics make of it.
+    pub displacement: Matrix,
+}
+
+/// The output stage of one output, with the changes that pass through it.
+pub(crate) struct Sensing<'a> {
+    blocks: Vec<(&'a Effect, Vec<f64>, Vec<f64>)>,
+}
+
+impl<'a> Sensing<'a> {
+    /// The output stood at `first`; `unknowns` changes pass.
+    pub(crate) fn new(point: &'a Point, output: usize, first: f64, unknowns: usize) -> Self {
+        let own = point.at_stage(Stage::Output).filter(|e| e.block().channel() == output);
+        let mut value = first;
+        let blocks = own.map(|effect| {
+            let moment = point.moment(0, &[]);
+            let state = effect.block().rest(value, moment);
+            value = effect.block().sense(&mut state.clone(), value, moment).0;
+            (effect, state, vec![0.0; unknowns])
+        });
+        Self { blocks: blocks.collect() }
+    }
+
+    /// Takes one sample through, and the row of its derivatives.
+    pub(crate) fn step(&mut self, output: f64, row: Option<&mut [f64]>, moment: Moment) -> f64 {
+        let mut value = output;
+        let mut row = row;
+        for (effect, state, held) in &mut self.blocks {
+            let (sensed, slope) = effect.block().sense(state, value, moment);
+            value = sensed;
+            let Some(row) = row.as_deref_mut() else { continue };
+            match slope {
+                Slope::Times(factor) => row.iter_mut().for_each(|value| *value *= factor),
+                Slope::Held => row.copy_from_slice(held),
+            }
+            held.copy_from_slice(row);
+        }
+        value
     }
 }

@@ -15,7 +15,7 @@ impl Grid {
     /// Half-widths: given, or `r_i = i/n` of half the span of z, which is the widest play that moves.
     ///
     /// `r = 0` is always among them.
-    pub(super) fn half_widths(&self, span: f64) -> Result<Vec<f64>, Error> {
+    pub(crate) fn half_widths(&self, span: f64) -> Result<Vec<f64>, Error> {
         let mut values = match self {
             Self::Count(0) => {
                 return Err(Error::parameter("half_widths", 0, "at least one play is needed"));
@@ -35,7 +35,7 @@ impl Grid {
     }
 
     /// Thresholds other than 0: given, or spread evenly inside the range of u.
-    pub(super) fn thresholds(&self, (low, high): (f64, f64)) -> Result<Vec<f64>, Error> {
+    pub(crate) fn thresholds(&self, (low, high): (f64, f64)) -> Result<Vec<f64>, Error> {
         let mut values: Vec<f64> = match self {
             Self::Count(count) => {
                 (1..=*count).map(|j| low + (high - low) * j as f64 / (count + 1) as f64).collect()

@@ -11,7 +11,7 @@ use crate::{Channel, Error, Experiment, Hysteresis, Matrix, Record};
 use nalgebra::DVector;
 
 /// The first sample from which no play remembers its start: z has spanned twice the widest half-width.
-pub(super) fn forgets_at(input: impl Iterator<Item = f64>, widest: f64) -> Option<usize> {
+pub(crate) fn forgets_at(input: impl Iterator<Item = f64>, widest: f64) -> Option<usize> {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for (k, value) in input.enumerate() {
         (low, high) = (low.min(value), high.max(value));
@@ -74,6 +74,7 @@ pub fn fit_hysteresis(
         output: Matrix::from_column_slice(v.len(), 1, v),
         covariates: Matrix::zeros(u.len(), 0),
         warmup: 0,
+        held_out: vec![],
     };
     let channel = |name: &str| vec![Channel::new(name, "")];
     let record = Record::new(vec![run], 1.0, channel("u"), channel("v"), vec![])?;
@@ -101,6 +102,8 @@ pub fn fit_hysteresis(
     let point = Point {
         channels: vec![parameters],
         dynamics: Sections::delayed_gain(&Matrix::from_element(1, 1, 1.0), 0),
+        effects: Vec::new(),
+        rate: 1.0,
         pasts: vec![Past { plays, moving: true, state: DVector::zeros(0) }],
         offsets: vec![Matrix::from_element(1, 1, experiment.output.mean())],
     };

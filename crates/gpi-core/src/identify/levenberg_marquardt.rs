@@ -32,7 +32,7 @@ impl Status {
 
 /// Where a fit ended and how it got there.
 #[derive(Clone)]
-pub(super) struct Fitted {
+pub(crate) struct Fitted {
     pub point: Point,
     pub linearization: Linearization,
     /// The cost at the start and after every accepted step.
@@ -42,7 +42,7 @@ pub(super) struct Fitted {
 
 /// What is free, how residuals count, and when to options.
 #[derive(Clone, Debug)]
-pub(super) struct FitOptions {
+pub(crate) struct FitOptions {
     pub freedom: Freedom,
     pub weighting: Weighting,
     /// Linearizations, accepted or not.
@@ -54,7 +54,7 @@ pub(super) struct FitOptions {
 impl Fitted {
     /// The same fit with what came before it in its history. Where the loss has changed, the earlier
     /// costs are brought to the scale of the later ones: both know the cost of the point between.
-    pub(super) fn after(mut self, before: &[f64]) -> Self {
+    pub(crate) fn after(mut self, before: &[f64]) -> Self {
         if let (Some(last), Some(first)) = (before.last(), self.history.first()) {
             let scale = if *last > 0.0 { first / last } else { 1.0 };
             let earlier = before[..before.len() - 1].iter().map(|cost| scale * cost);
@@ -65,7 +65,7 @@ impl Fitted {
 }
 
 /// Minimises the cost over everything that is free.
-pub(super) fn fit(
+pub(crate) fn fit(
     point: Point,
     record: &Record,
     options: &FitOptions,

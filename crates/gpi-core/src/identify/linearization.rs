@@ -8,7 +8,7 @@ use nalgebra::DVector;
 
 /// How residuals count.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Weighting {
+pub(crate) struct Weighting {
     /// A factor for each output, which brings outputs of different units to one scale.
     pub outputs: Vec<f64>,
     /// Where Huber's loss turns from square to linear, in each output's unit; infinite for least
@@ -18,12 +18,12 @@ pub(super) struct Weighting {
 
 impl Weighting {
     /// Plain least squares.
-    pub(super) fn equal(outputs: usize) -> Self {
+    pub(crate) fn equal(outputs: usize) -> Self {
         Self { outputs: vec![1.0; outputs], turns: vec![f64::INFINITY; outputs] }
     }
 
     /// The factor of a residual's square, and the loss it adds to the cost.
-    pub(super) fn of(&self, output: usize, residual: f64) -> (f64, f64) {
+    pub(crate) fn of(&self, output: usize, residual: f64) -> (f64, f64) {
         let (scale, turn) = (self.outputs[output].powi(2), self.turns[output]);
         let size = residual.abs();
         if size <= turn {
@@ -37,14 +37,16 @@ impl Weighting {
 impl Weighting {
     /// Mean second derivative of the loss over the mean weight of the reweighted squares, which stand
     /// in for it in the normal equations: 1 for least squares.
-    pub(super) fn curvature(&self, residuals: &[Matrix], record: &Record) -> f64 {
+    pub(crate) fn curvature(&self, residuals: &[Matrix], record: &Record) -> f64 {
         let (mut inside, mut weights) = (0.0, 0.0);
         for (residual, experiment) in residuals.iter().zip(record.experiments()) {
-            let scored = residual.rows(experiment.warmup, residual.nrows() - experiment.warmup);
-            for (output, column) in scored.column_iter().enumerate() {
-                let turn = self.turns[output];
-                inside += column.iter().filter(|value| value.abs() <= turn).count() as f64;
-                weights += column.iter().map(|value| (turn / value.abs()).min(1.0)).sum::<f64>();
+            for scored in experiment.scored_rows(residual) {
+                for (output, column) in scored.column_iter().enumerate() {
+                    let turn = self.turns[output];
+                    inside += column.iter().filter(|value| value.abs() <= turn).count() as f64;
+                    weights +=
+                        column.iter().map(|value| (turn / value.abs()).min(1.0)).sum::<f64>();
+                }
             }
         }
         if weights > 0.0 { inside / weights } else { 1.0 }
@@ -52,7 +54,7 @@ impl Weighting {
 
     /// Turns residuals (samples, outputs) into what enters the gradient: scaled, and clipped where the loss is
     /// linear.
-    pub(super) fn apply(&self, residual: &mut Matrix) {
+    pub(crate) fn apply(&self, residual: &mut Matrix) {
         for (output, mut column) in residual.column_iter_mut().enumerate() {
             let (scale, turn) = (self.outputs[output], self.turns[output]);
             column.apply(|value| *value = scale * value.clamp(-turn, turn));
@@ -62,7 +64,7 @@ impl Weighting {
 
 /// Normal equations for steps away from a [`Point`].
 #[derive(Clone)]
-pub(super) struct Linearization {
+pub(crate) struct Linearization {
     pub equations: NormalEquations,
     pub layout: Layout,
     /// Sum of the losses.
@@ -71,7 +73,7 @@ pub(super) struct Linearization {
 
 impl Linearization {
     /// Streams the record through the model and its derivatives.
-    pub(super) fn new(
+    pub(crate) fn new(
         point: &Point,
         record: &Record,
         freedom: Freedom,
@@ -83,7 +85,7 @@ impl Linearization {
         let mut cost = 0.0;
         for (index, experiment) in record.experiments().iter().enumerate() {
             check()?;
-            let mut stream = Stream::new(point, &layout, freedom.derivatives, experiment, index);
+            let mut stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
             stream.run(&mut |rows| {
                 check()?;
                 for (output, regressor) in rows.regressors.iter().enumerate() {
@@ -105,12 +107,12 @@ impl Linearization {
     }
 
     /// Half the steepest descent of the cost.
-    pub(super) fn descent(&self) -> DVector<f64> {
+    pub(crate) fn descent(&self) -> DVector<f64> {
         self.equations.rhs.column(0).into_owned()
     }
 
     /// By how much the cost falls with a step if the model were linear.
-    pub(super) fn predicted(&self, step: &DVector<f64>) -> f64 {
+    pub(crate) fn predicted(&self, step: &DVector<f64>) -> f64 {
         2.0 * step.dot(&self.descent()) - (&self.equations.gram * step).dot(step)
     }
 }

@@ -9,29 +9,29 @@
 //! Everything is fitted and chosen on the record that is given.
 
 mod bands;
-mod chain;
-mod colour;
+pub(crate) mod chain;
+pub(crate) mod colour;
 mod dynamic;
 mod dynamics;
 mod fit_start;
-mod free_run;
+pub(crate) mod free_run;
 mod grid;
 mod hysteresis;
 mod identification;
-mod levenberg_marquardt;
-mod linearization;
+pub(crate) mod levenberg_marquardt;
+pub(crate) mod linearization;
 mod names;
-mod noise_floor;
-mod outliers;
-mod point;
-mod preparation;
+pub(crate) mod noise_floor;
+pub(crate) mod outliers;
+pub(crate) mod point;
+pub(crate) mod preparation;
 mod quasi_static;
-mod refine;
+pub(crate) mod refine;
 mod sensitivities;
-mod sensitivity;
-mod stream;
-mod structure;
-mod uncertainty;
+pub(crate) mod sensitivity;
+pub(crate) mod stream;
+pub(crate) mod structure;
+pub(crate) mod uncertainty;
 
 pub use bands::{PoleDeviations, ResponseDeviation};
 pub use chain::identify;
@@ -49,6 +49,6 @@ pub use structure::Candidate;
 /// work with [`Error::Interrupted`](crate::Error::Interrupted).
 pub type Progress<'a> = &'a mut dyn FnMut(&str, f64) -> bool;
 
-fn report(progress: Progress, stage: &str, done: f64) -> Result<(), crate::Error> {
+pub(crate) fn report(progress: Progress, stage: &str, done: f64) -> Result<(), crate::Error> {
     if progress(stage, done) { Ok(()) } else { Err(crate::Error::Interrupted) }
 }

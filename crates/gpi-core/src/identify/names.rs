@@ -6,7 +6,7 @@ use crate::{Channel, Record};
 impl Layout {
     /// A name for every unknown, such as `u.weights[3]`; play weights, deadzone weights, thresholds
     /// and half-widths are numbered as in the point, experiments and knots from 0.
-    pub(super) fn names(&self, point: &Point, record: &Record) -> Vec<String> {
+    pub(crate) fn names(&self, point: &Point, record: &Record) -> Vec<String> {
         let mut names = vec![String::new(); self.len];
         let (inputs, outputs) = (record.inputs(), record.outputs());
         let name = |channel: &Channel| channel.name.clone();
@@ -50,6 +50,11 @@ impl Layout {
                     format!("feedthrough[{}, {}]", name(&outputs[output]), name(&inputs[input]));
             }
         }
+        for (effect, unknowns) in point.effects.iter().zip(&self.effects) {
+            for (place, i) in unknowns.clone().enumerate() {
+                names[i] = format!("{}.value[{place}]", effect.name());
+            }
+        }
         for (experiment, unknowns) in self.offsets.iter().enumerate() {
             let knots = point.offsets[experiment].nrows();
             for (place, i) in unknowns.clone().enumerate() {
@@ -75,7 +80,7 @@ impl Layout {
     }
 
     /// The value of every unknown.
-    pub(super) fn values(&self, point: &Point) -> Vec<f64> {
+    pub(crate) fn values(&self, point: &Point) -> Vec<f64> {
         let mut values = vec![0.0; self.len];
         let mut set = |unknowns: &std::ops::Range<usize>, from: &[f64]| {
             for (i, value) in unknowns.clone().zip(from) {
@@ -92,6 +97,9 @@ impl Layout {
             set(&unknowns.a, &section.a);
             set(&unknowns.b, section.b.as_slice());
             set(&unknowns.c, section.c.as_slice());
+        }
+        for (effect, unknowns) in point.effects.iter().zip(&self.effects) {
+            set(unknowns, &effect.block().values());
         }
         for (element, unknown) in point.dynamics.d.iter().zip(&self.feedthrough) {
             if let &Some(i) = unknown {

@@ -116,13 +116,14 @@ impl NoiseFloor {
         let rms = (0..record.outputs().len()).map(|output| {
             let (mut power, mut lines) = (0.0, 0.0);
             for (residual, experiment) in residuals.iter().zip(record.experiments()) {
-                let scored = residual.rows(experiment.warmup, residual.nrows() - experiment.warmup);
-                let length = scored.nrows().min(LONGEST);
-                for first in (0..=scored.nrows() - length).step_by(length) {
-                    let piece = scored.view((first, output), (length, 1)).into_owned();
-                    let (own, count) = high_lines(&mut planner, piece.as_slice());
-                    power += own;
-                    lines += count;
+                for scored in experiment.scored_rows(residual) {
+                    let length = scored.nrows().min(LONGEST);
+                    for first in (0..=scored.nrows() - length).step_by(length) {
+                        let piece = scored.view((first, output), (length, 1)).into_owned();
+                        let (own, count) = high_lines(&mut planner, piece.as_slice());
+                        power += own;
+                        lines += count;
+                    }
                 }
             }
             (power / lines).sqrt()
@@ -210,6 +211,7 @@ mod tests {
             output: column(y),
             covariates: Matrix::zeros(u.len(), 0),
             warmup: 0,
+            held_out: vec![],
         };
         Record::new(
             vec![run],

@@ -4,7 +4,7 @@ use crate::{Matrix, Record};
 
 /// Median absolute deviation over that of a Gaussian: a standard deviation that a few wrong samples do
 /// not move.
-pub(super) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
     const GAUSSIAN: f64 = 1.482_602_218_505_602;
     let mut sizes: Vec<f64> = values.map(f64::abs).collect();
     if sizes.is_empty() {
@@ -16,33 +16,61 @@ pub(super) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// The robust standard deviation of each output's scored residual.
-pub(super) fn deviations(residuals: &[Matrix], record: &Record) -> Vec<f64> {
+pub(crate) fn deviations(residuals: &[Matrix], record: &Record) -> Vec<f64> {
     let outputs = record.outputs().len();
     let scored = |output: usize| {
         residuals.iter().zip(record.experiments()).flat_map(move |(residual, experiment)| {
-            (experiment.warmup..residual.nrows()).map(move |k| residual[(k, output)])
+            experiment.scored_runs().flatten().map(move |k| residual[(k, output)])
         })
     };
     (0..outputs).map(|output| robust_deviation(scored(output))).collect()
 }
 
-/// How many scored samples stand apart from their four neighbours' median by more than six robust
-/// standard deviations of that difference. Slow or structured residuals have none.
-pub(super) fn count(residuals: &[Matrix], record: &Record) -> usize {
+/// How many scored samples of a residual are isolated outliers, see [`places`].
+pub(crate) fn count(residuals: &[Matrix], record: &Record) -> usize {
+    places(residuals, record).iter().flatten().map(Vec::len).sum()
+}
+
+/// The scored samples of signals (samples, outputs) that stand apart, `[experiment][output]`.
+///
+/// A sample stands apart when it differs from the median of its four neighbours by more than six robust
+/// standard deviations of such differences, and by four times more than any sample a little further
+/// away: slow or structured signals have none, however rough.
+pub(crate) fn places(signals: &[Matrix], record: &Record) -> Vec<Vec<Vec<usize>>> {
     const APART: f64 = 6.0;
-    let mut found = 0;
+    const ALONE: f64 = 4.0;
+    /// Of the samples around; the nearest two have this one among their neighbours.
+    const AROUND: std::ops::RangeInclusive<usize> = 3..=12;
+    let mut found = vec![vec![Vec::new(); record.outputs().len()]; signals.len()];
     for output in 0..record.outputs().len() {
-        let mut differences = Vec::new();
-        for (residual, experiment) in residuals.iter().zip(record.experiments()) {
-            for k in experiment.warmup + 2..residual.nrows().saturating_sub(2) {
-                let mut beside =
-                    [-2_isize, -1, 1, 2].map(|lag| residual[(k.wrapping_add_signed(lag), output)]);
-                beside.sort_by(f64::total_cmp);
-                differences.push(residual[(k, output)] - 0.5 * (beside[1] + beside[2]));
-            }
+        let differences: Vec<Vec<f64>> =
+            signals.iter().map(|signal| apart(signal.column(output).as_slice())).collect();
+        let scored = differences.iter().zip(record.experiments()).flat_map(|(values, e)| {
+            e.scored_runs().flatten().filter_map(|k| values.get(k).copied())
+        });
+        let limit = APART * robust_deviation(scored);
+        for (index, (values, experiment)) in
+            differences.iter().zip(record.experiments()).enumerate()
+        {
+            let size = |k: Option<usize>| k.and_then(|k| values.get(k)).map_or(0.0, |d| d.abs());
+            let alone = |&k: &usize| {
+                let around = AROUND.map(|lag| size(k.checked_sub(lag)).max(size(Some(k + lag))));
+                let own = size(Some(k));
+                own > limit && own > ALONE * around.fold(0.0, f64::max)
+            };
+            found[index][output] = experiment.scored_runs().flatten().filter(alone).collect();
         }
-        let limit = APART * robust_deviation(differences.iter().copied());
-        found += differences.iter().filter(|difference| difference.abs() > limit).count();
     }
     found
+}
+
+/// What every sample differs by from the median of its four neighbours; zero at the ends.
+fn apart(values: &[f64]) -> Vec<f64> {
+    let mut differences = vec![0.0; values.len()];
+    for k in 2..values.len().saturating_sub(2) {
+        let mut beside = [values[k - 2], values[k - 1], values[k + 1], values[k + 2]];
+        beside.sort_by(f64::total_cmp);
+        differences[k] = values[k] - 0.5 * (beside[1] + beside[2]);
+    }
+    differences
 }

@@ -1,6 +1,7 @@
 //! Everything that is estimated, as one point, and where each unknown stands in a step away from it.
 
 use super::sensitivity::{Derivatives, Parameters};
+use crate::effects::{Effect, Stage};
 use crate::linear::Sections;
 use crate::{Matrix, Record};
 use nalgebra::DVector;
@@ -8,7 +9,7 @@ use std::ops::Range;
 
 /// What was before the first sample of an experiment.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Past {
+pub(crate) struct Past {
     /// Where the plays stood between their lowest place beside z (-1) and their highest one (1),
     /// `[input][play]`; `None` when the actuator came from rest.
     pub plays: Option<Vec<Vec<f64>>>,
@@ -21,10 +22,15 @@ pub(super) struct Past {
 
 /// All parameters of a model and of its experiments.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Point {
+pub(crate) struct Point {
     /// One hysteresis an input.
     pub channels: Vec<Parameters>,
+    /// G, and beside it the sections of effects.
     pub dynamics: Sections,
+    /// In the order of the chain. Values of those that are sections stand in `dynamics`.
+    pub effects: Vec<Effect>,
+    /// Sampling rate in Hz.
+    pub rate: f64,
     /// One an experiment.
     pub pasts: Vec<Past>,
     /// The additive term at evenly spaced knots of each experiment, (knots, outputs); one knot is a
@@ -34,7 +40,7 @@ pub(super) struct Point {
 
 /// What is free of the linear dynamics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum DynamicsFreedom {
+pub(crate) enum DynamicsFreedom {
     Nothing,
     /// Everything but the poles.
     Numerator,
@@ -43,7 +49,7 @@ pub(super) enum DynamicsFreedom {
 
 /// Which parameters are free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Freedom {
+pub(crate) struct Freedom {
     /// Weights, slopes and offsets.
     pub weights: bool,
     /// Thresholds, half-widths, start values.
@@ -56,7 +62,7 @@ pub(super) struct Freedom {
 
 /// Where each group of unknowns stands.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Layout {
+pub(crate) struct Layout {
     pub weights: Vec<Range<usize>>,
     pub slopes: Vec<Range<usize>>,
     pub thresholds: Vec<Range<usize>>,
@@ -64,6 +70,8 @@ pub(super) struct Layout {
     pub sections: Vec<SectionLayout>,
     /// One unknown for each element of D by columns, `None` where the held DC gain sets it.
     pub feedthrough: Vec<Option<usize>>,
+    /// The values of each effect; none of those that are sections.
+    pub effects: Vec<Range<usize>>,
     /// `[experiment]`, (knots, outputs) by columns.
     pub offsets: Vec<Range<usize>>,
     /// `[experiment][input]`.
@@ -75,7 +83,7 @@ pub(super) struct Layout {
 
 /// Where the unknowns of one section stand.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct SectionLayout {
+pub(crate) struct SectionLayout {
     pub a: Range<usize>,
     /// (order, inputs) by columns.
     pub b: Range<usize>,
@@ -84,7 +92,7 @@ pub(super) struct SectionLayout {
 }
 
 impl Layout {
-    pub(super) fn new(point: &Point, freedom: Freedom) -> Self {
+    pub(crate) fn new(point: &Point, freedom: Freedom) -> Self {
         let mut end = 0;
         let mut take = |wanted: bool, count: usize| {
             let start = end;
@@ -116,6 +124,10 @@ impl Layout {
                 feedthrough.push(free.then(|| take(true, 1).start));
             }
         }
+        let values = |effect: &Effect| effect.block().values().len();
+        let effects = point.effects.iter();
+        let effects =
+            effects.map(|e| take(e.block().sections(1.0).is_empty(), values(e))).collect();
         let offsets = point.offsets.iter().map(|knots| take(true, knots.len())).collect();
         let unknown = |past: &Past| derivatives.starts && past.plays.is_some();
         let plays = point
@@ -134,6 +146,7 @@ impl Layout {
             half_widths,
             sections,
             feedthrough,
+            effects,
             offsets,
             plays,
             states,
@@ -142,14 +155,14 @@ impl Layout {
     }
 
     /// Unknowns that enter the output linearly when all others are kept.
-    pub(super) fn is_linear(&self, unknown: usize) -> bool {
+    pub(crate) fn is_linear(&self, unknown: usize) -> bool {
         let among = |ranges: &[Range<usize>]| ranges.iter().any(|range| range.contains(&unknown));
         among(&self.weights) || among(&self.offsets) || among(&self.states)
     }
 }
 
 /// What a step may be, elementwise; a fixed unknown has both bounds at zero.
-pub(super) struct Bounds {
+pub(crate) struct Bounds {
     pub lower: DVector<f64>,
     pub upper: DVector<f64>,
 }
@@ -157,7 +170,7 @@ pub(super) struct Bounds {
 impl Point {
     /// The bounds of a step: weights stay positive, plays stay around z, thresholds on their side of
     /// zero and inside the range of u, half-widths in order.
-    pub(super) fn bounds(&self, layout: &Layout, record: &Record, freedom: Freedom) -> Bounds {
+    pub(crate) fn bounds(&self, layout: &Layout, record: &Record, freedom: Freedom) -> Bounds {
         /// Fraction of a gap to a neighbour, or of a range, that one step may take.
         const REACH: f64 = 0.4;
         let mut lower = DVector::from_element(layout.len, f64::NEG_INFINITY);
@@ -209,8 +222,34 @@ impl Point {
                 bound(i, -REACH * below, REACH * above);
             }
         }
+        for (effect, unknowns) in self.effects.iter().zip(&layout.effects) {
+            let block = effect.block();
+            let limits = block.values().into_iter().zip(block.bounds());
+            for ((value, (low, high)), i) in limits.zip(unknowns.clone()) {
+                if freedom.weights {
+                    bound(i, low - value, high - value);
+                } else {
+                    bound(i, 0.0, 0.0);
+                }
+            }
+        }
         for (section, unknowns) in self.dynamics.sections.iter().zip(&layout.sections) {
             let outputs = self.dynamics.outputs();
+            if let Some(effect) = section.beside {
+                let (low, high) = self.effects[effect].block().section_bounds(self.rate);
+                if let ([a1], true) = (&section.a[..], !unknowns.a.is_empty()) {
+                    bound(unknowns.a.start, low - a1, high - a1);
+                }
+                // one input drives it
+                let order = section.order();
+                let others = unknowns.b.clone().enumerate();
+                let drives = |place: usize| section.b.column(place / order).amax() != 0.0;
+                let input = self.effects[effect].block().channel();
+                for (place, i) in others.filter(|&(place, _)| place / order != input) {
+                    debug_assert!(!drives(place));
+                    bound(i, 0.0, 0.0);
+                }
+            }
             for i in unknowns.c.clone().skip(section.reference).step_by(outputs) {
                 bound(i, 0.0, 0.0);
             }
@@ -232,7 +271,7 @@ impl Point {
     }
 
     /// The unknowns that are not held.
-    pub(super) fn estimated(
+    pub(crate) fn estimated(
         &self,
         layout: &Layout,
         record: &Record,
@@ -245,7 +284,7 @@ impl Point {
     /// Puts plays without weight at `sides` beside z in turn and, where half-widths may move, spreads
     /// them over the upper half below `limits` (one an input), where plays forget last; returns how
     /// many there are.
-    pub(super) fn put_idle_plays(&mut self, sides: &[f64], limits: Option<&[f64]>) -> usize {
+    pub(crate) fn put_idle_plays(&mut self, sides: &[f64], limits: Option<&[f64]>) -> usize {
         let mut moved = 0;
         for (input, channel) in self.channels.iter_mut().enumerate() {
             let is_idle = |&i: &usize| i > 0 && channel.weights[i] == 0.0;
@@ -276,7 +315,7 @@ impl Point {
 
     /// Drops plays and deadzones without weight and joins deadzones that have come together; says
     /// whether there were any.
-    pub(super) fn drop_unused(&mut self) -> bool {
+    pub(crate) fn drop_unused(&mut self) -> bool {
         /// Thresholds closer than this fraction of their range are one.
         const TOGETHER: f64 = 3e-3;
         let mut dropped = false;
@@ -310,7 +349,7 @@ impl Point {
 
     /// Takes the weight from the deadzone, the identity apart, that has the largest share in each
     /// direction that the data do not determine; says whether there was one.
-    pub(super) fn silence_deadzones(&mut self, layout: &Layout, open: &Matrix) -> bool {
+    pub(crate) fn silence_deadzones(&mut self, layout: &Layout, open: &Matrix) -> bool {
         /// Where it has a smaller share, the direction is about something else.
         const SHARE: f64 = 0.3;
         let mut silenced = false;
@@ -329,9 +368,77 @@ impl Point {
         silenced
     }
 
+    /// The point with one more effect, in its place of the chain.
+    pub(crate) fn with_effect(&self, effect: Effect) -> Self {
+        let mut point = self.clone();
+        let stage = |effect: &Effect| effect.block().stage();
+        let place = point.effects.partition_point(|other| stage(other) <= stage(&effect));
+        let sections = effect.block().sections(point.rate);
+        let input = effect.block().channel();
+        point.effects.insert(place, effect);
+        for section in &mut point.dynamics.sections {
+            section.beside = section.beside.map(|own| if own >= place { own + 1 } else { own });
+        }
+        for (a, b) in sections {
+            let order = a.len();
+            point.dynamics.push_beside(place, input, a, &b);
+            for past in &mut point.pasts {
+                past.state = past.state.clone().resize_vertically(past.state.len() + order, 0.0);
+            }
+        }
+        point
+    }
+
+    /// The point without one of its effects.
+    pub(crate) fn without_effect(&self, place: usize) -> Self {
+        let mut point = self.clone();
+        point.effects.remove(place);
+        let kept: Vec<bool> =
+            self.dynamics.sections.iter().map(|section| section.beside != Some(place)).collect();
+        let states: Vec<bool> = self
+            .dynamics
+            .sections
+            .iter()
+            .zip(&kept)
+            .flat_map(|(section, &kept)| std::iter::repeat_n(kept, section.order()))
+            .collect();
+        let mut flags = kept.iter();
+        point.dynamics.sections.retain(|_| *flags.next().unwrap_or(&true));
+        for section in &mut point.dynamics.sections {
+            section.beside = section.beside.map(|own| if own > place { own - 1 } else { own });
+        }
+        for past in &mut point.pasts {
+            let left = past.state.iter().zip(&states).filter(|(_, kept)| **kept);
+            past.state = DVector::from_vec(left.map(|(value, _)| *value).collect());
+        }
+        point
+    }
+
+    /// The effects, with the values that stand in the dynamics.
+    pub(crate) fn blocks(&self) -> Vec<Effect> {
+        let mut effects = self.effects.clone();
+        for (place, effect) in effects.iter_mut().enumerate() {
+            let input = effect.block().channel();
+            let own = self.dynamics.sections.iter().filter(|s| s.beside == Some(place));
+            let sections: Vec<_> = own
+                .map(|s| (s.a.clone(), s.b.column(input).iter().copied().collect::<Vec<_>>()))
+                .collect();
+            if !sections.is_empty() {
+                let dead_time = self.dynamics.delay;
+                effect.block_mut().set_sections(&sections, dead_time, self.rate);
+            }
+        }
+        effects
+    }
+
+    /// The effects of a stage.
+    pub(crate) fn at_stage(&self, stage: Stage) -> impl Iterator<Item = &Effect> {
+        self.effects.iter().filter(move |effect| effect.block().stage() == stage)
+    }
+
     /// The point one step away. A section whose poles would leave the unit circle goes as far as they
     /// stay inside.
-    pub(super) fn moved(&self, step: &DVector<f64>, layout: &Layout) -> Self {
+    pub(crate) fn moved(&self, step: &DVector<f64>, layout: &Layout) -> Self {
         let mut moved = self.clone();
         let add = |values: &mut [f64], unknowns: &Range<usize>| {
             for (value, i) in values.iter_mut().zip(unknowns.clone()) {
@@ -369,6 +476,13 @@ impl Point {
         if layout.feedthrough.iter().any(Option::is_some) || !layout.sections.is_empty() {
             moved.dynamics.hold_gain();
         }
+        for (effect, unknowns) in moved.effects.iter_mut().zip(&layout.effects) {
+            let mut values = effect.block().values();
+            add(&mut values, unknowns);
+            if !unknowns.is_empty() {
+                effect.block_mut().set(&values);
+            }
+        }
         for (index, start) in moved.pasts.iter_mut().enumerate() {
             add(moved.offsets[index].as_mut_slice(), &layout.offsets[index]);
             add(start.state.as_mut_slice(), &layout.states[index]);
@@ -380,7 +494,7 @@ impl Point {
 }
 
 /// Smallest and largest input of all experiments.
-pub(super) fn range(record: &Record, input: usize) -> (f64, f64) {
+pub(crate) fn range(record: &Record, input: usize) -> (f64, f64) {
     let columns = record.experiments().iter().map(|e| e.input.column(input));
     columns.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), column| {
         (low.min(column.min()), high.max(column.max()))

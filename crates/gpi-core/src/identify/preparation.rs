@@ -5,11 +5,11 @@ use super::hysteresis::forgets_at;
 use super::point::{Past, Point};
 use super::sensitivity::Parameters;
 use crate::linear::Sections;
-use crate::{Error, Experiment, Matrix, Record};
+use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::DVector;
 
 /// A record made ready, and hysteresis parameters to start from.
-pub(super) struct Prepared<'a> {
+pub(crate) struct Prepared<'a> {
     pub given: &'a Record,
     /// The record without the samples that the plays' unknown past disturbs, and without the mean
     /// of each output.
@@ -26,12 +26,12 @@ pub(super) struct Prepared<'a> {
 impl<'a> Prepared<'a> {
     /// Finds out which past is known. Samples in which the plays forget an unknown past are left out
     /// of the score where they are few.
-    pub(super) fn new(given: &'a Record, channels: Vec<Parameters>) -> Result<Self, Error> {
+    pub(crate) fn new(given: &'a Record, channels: Vec<Parameters>) -> Result<Self, Error> {
         Self::with_forgetting(given, channels, 0.1)
     }
 
     /// The same with all starts in motion to be fitted, and all samples scored.
-    pub(super) fn scoring_all(given: &'a Record, channels: Vec<Parameters>) -> Result<Self, Error> {
+    pub(crate) fn scoring_all(given: &'a Record, channels: Vec<Parameters>) -> Result<Self, Error> {
         Self::with_forgetting(given, channels, 0.0)
     }
 
@@ -61,6 +61,7 @@ impl<'a> Prepared<'a> {
             match forgets {
                 Some(at) if (at as f64) < fraction * experiment.input.nrows() as f64 => {
                     experiment.warmup = at;
+                    experiment.held_out.retain(|held| held.start >= at);
                     notes.push(format!(
                         "experiment {index} starts in motion: its first {at} samples, in which the \
                          plays forget their past, are not scored"
@@ -88,18 +89,29 @@ impl<'a> Prepared<'a> {
     }
 
     /// The prepared hysteresis before given dynamics.
-    pub(super) fn point(&self, dynamics: Sections) -> Point {
+    pub(crate) fn point(&self, dynamics: Sections) -> Point {
         let state = DVector::zeros(dynamics.order());
         let past = |&moving: &bool| Past { plays: None, moving, state: state.clone() };
         let pasts: Vec<Past> = self.moving.iter().map(past).collect();
         let offsets = vec![Matrix::zeros(1, self.means.len()); pasts.len()];
-        let mut point = Point { channels: self.channels.clone(), dynamics, pasts, offsets };
+        let channels = self.channels.clone();
+        let (effects, rate) = (Vec::new(), self.record.rate());
+        let mut point = Point { channels, dynamics, effects, rate, pasts, offsets };
         self.settle(&mut point);
         point
     }
 
+    /// The dynamics and effects of a model behind the prepared hysteresis, the gain in the plays.
+    pub(crate) fn point_of(&self, model: &Model) -> Result<Point, Error> {
+        let point = self.point(Sections::from_delayed_state_space(model.linear())?);
+        let effects = model.effects().iter().cloned();
+        let mut point = effects.fold(point, |point, effect| point.with_effect(effect));
+        rescale(&mut point);
+        Ok(point)
+    }
+
     /// Spreads counted half-widths over the present span of z; the weights are fitted next anyway.
-    pub(super) fn place(&self, point: &mut Point, half_widths: &Grid) -> Result<(), Error> {
+    pub(crate) fn place(&self, point: &mut Point, half_widths: &Grid) -> Result<(), Error> {
         let spans = self.spans(point);
         for (channel, span) in point.channels.iter_mut().zip(spans) {
             channel.half_widths = half_widths.half_widths(span)?;
@@ -108,7 +120,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// The span of z of each input.
-    pub(super) fn spans(&self, point: &Point) -> Vec<f64> {
+    pub(crate) fn spans(&self, point: &Point) -> Vec<f64> {
         let span = |(input, channel): (usize, &Parameters)| {
             let experiments = self.record.experiments().iter();
             let ranges =
@@ -123,7 +135,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Starts the plays anew: from rest, or where the past is unknown at z.
-    pub(super) fn settle(&self, point: &mut Point) {
+    pub(crate) fn settle(&self, point: &mut Point) {
         let at_z = || point.channels.iter().map(|c| vec![0.0; c.half_widths.len()]).collect();
         for (past, &unknown) in point.pasts.iter_mut().zip(&self.unknown_past) {
             past.plays = unknown.then(at_z);
@@ -131,12 +143,12 @@ impl<'a> Prepared<'a> {
     }
 
     /// How many output values are scored.
-    pub(super) fn values(&self) -> f64 {
+    pub(crate) fn values(&self) -> f64 {
         (self.record.scored() * self.means.len()) as f64
     }
 
     /// The record with u replaced by the hysteresis' output v.
-    pub(super) fn driven(&self, point: &Point) -> Result<Record, Error> {
+    pub(crate) fn driven(&self, point: &Point) -> Result<Record, Error> {
         let driven = |(experiment, past): (&Experiment, &Past)| {
             let input = point.intermediate(&experiment.input, past);
             Experiment { input, ..experiment.clone() }
@@ -147,15 +159,18 @@ impl<'a> Prepared<'a> {
 
     /// Runs the model free over the training data: root mean square of what is left. The point's
     /// offsets become those that fit best.
-    pub(super) fn free_run(&self, point: &mut Point) -> Result<f64, Error> {
+    pub(crate) fn free_run(&self, point: &mut Point) -> Result<f64, Error> {
         let mut squares = 0.0;
         let residuals = point.residuals(&self.record)?;
         for (index, experiment) in self.record.experiments().iter().enumerate() {
-            let rest = &residuals[index];
-            let scored = rest.rows(experiment.warmup, rest.nrows() - experiment.warmup);
-            let means = scored.row_mean();
-            for (column, mean) in scored.column_iter().zip(means.iter()) {
-                squares += column.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+            let runs: Vec<_> = experiment.scored_rows(&residuals[index]).collect();
+            let count = experiment.scored() as f64;
+            let none = nalgebra::RowDVector::zeros(self.means.len());
+            let means = runs.iter().fold(none, |sum, run| sum + run.row_sum()) / count;
+            for run in &runs {
+                for (column, mean) in run.column_iter().zip(means.iter()) {
+                    squares += column.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+                }
             }
             for mut knot in point.offsets[index].row_iter_mut() {
                 knot += &means;
@@ -174,7 +189,7 @@ fn starts_at_rest(experiment: &Experiment) -> bool {
 }
 
 /// Moves the gain of G into the play weights.
-pub(super) fn rescale(point: &mut Point) {
+pub(crate) fn rescale(point: &mut Point) {
     for (channel, gain) in point.channels.iter_mut().zip(point.dynamics.normalize_gain()) {
         channel.weights.iter_mut().for_each(|weight| *weight *= gain);
     }

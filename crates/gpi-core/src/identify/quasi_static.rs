@@ -11,7 +11,7 @@ use crate::linear::{self, Sections};
 
 /// The linear part is a gain of plus or minus one with the delay that fits best, and with one sample
 /// less and more.
-pub(super) fn seeds(
+pub(crate) fn seeds(
     prepared: &Prepared,
     delay: Option<usize>,
     progress: Progress,
@@ -23,7 +23,7 @@ pub(super) fn seeds(
         let requirement = format!("at most {LONGEST_GIVEN} samples; shift the output instead");
         return Err(Error::parameter("delay", delay, requirement));
     }
-    let gain = linear::estimate(&prepared.record, 1, 0.0)?.markov.remove(0);
+    let gain = linear::estimate(&prepared.record.pieces(0)?, 1, 0.0)?.markov.remove(0);
     let delays = delay.map_or(0..=LONGEST_DELAY, |delay| delay..=delay);
     let mut options = settings(prepared, &RefineOptions::default(), 15);
     options.freedom.identity = false;

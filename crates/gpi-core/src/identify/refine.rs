@@ -10,7 +10,6 @@ use super::sensitivities::names_and_values;
 use super::sensitivity::{Derivatives, Parameters};
 use super::uncertainty::Uncertainty;
 use super::{Progress, report};
-use crate::linear::Sections;
 use crate::{Error, Matrix, Model, Record};
 
 /// What a refinement may move besides weights, deadzone weights, dynamics and offset, and how residuals
@@ -64,14 +63,14 @@ pub struct Refinement {
     pub outliers: usize,
     /// Whether Huber's loss was used.
     pub robust: bool,
-    pub(super) point: Point,
-    pub(super) layout: Layout,
-    pub(super) uncertainty: Uncertainty,
+    pub(crate) point: Point,
+    pub(crate) layout: Layout,
+    pub(crate) uncertainty: Uncertainty,
 }
 
 /// A refined point, before its uncertainty is worked out.
 #[derive(Clone)]
-pub(super) struct Refined {
+pub(crate) struct Refined {
     pub fitted: Fitted,
     pub options: FitOptions,
     pub outliers: usize,
@@ -102,7 +101,7 @@ pub(super) struct Refined {
 /// };
 /// let input = Matrix::from_fn(2000, 1, |k, _| 4.0 * (0.01 * k as f64).sin() * (0.07 * k as f64).cos());
 /// let output = model(0.5, 0.6)?.simulate(&input)?;
-/// let run = Experiment { input, output, covariates: Matrix::zeros(2000, 0), warmup: 500 };
+/// let run = Experiment { input, output, covariates: Matrix::zeros(2000, 0), warmup: 500, held_out: vec![] };
 /// let record = Record::new(vec![run], 1.0, vec![Channel::new("u", "")], vec![Channel::new("y", "")], vec![])?;
 /// let (refined, how) = refine(&model(0.7, 0.5)?, &record, &RefineOptions::default(), &mut |_, _| true)?;
 /// assert!((refined.hysteresis()[0].plays().weights()[1] - 0.5).abs() < 1e-6);
@@ -123,21 +122,19 @@ pub fn refine(
     record.require_moving()?;
     let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
     let prepared = Prepared::new(record, channels)?;
-    let dynamics = Sections::from_delayed_state_space(model.linear())?;
-    if !dynamics.is_stable() {
+    let point = prepared.point_of(model)?;
+    if !point.dynamics.is_stable() {
         return Err(Error::Unstable {
             modulus: model.linear().spectral_radius()?,
             remedy: "a refinement starts from a stable model",
         });
     }
-    let mut point = prepared.point(dynamics);
-    super::preparation::rescale(&mut point);
     let refined = joint(point, &prepared, options, f64::INFINITY, progress)?;
     let refinement = refined.finish(&prepared, progress)?;
     Ok((refinement.point.to_model(record, &prepared.record, &prepared.means)?, refinement))
 }
 
-pub(super) fn require_match(model: &Model, record: &Record) -> Result<(), Error> {
+pub(crate) fn require_match(model: &Model, record: &Record) -> Result<(), Error> {
     let inputs = (("model", model.inputs().len()), ("record", record.inputs().len()));
     let outputs = (("model", model.outputs().len()), ("record", record.outputs().len()));
     Error::require_equal("inputs", inputs.0, inputs.1)?;
@@ -150,7 +147,7 @@ pub(super) fn require_match(model: &Model, record: &Record) -> Result<(), Error>
 }
 
 /// Everything free that `options` and the record's past ask for, at most so many steps.
-pub(super) fn settings(prepared: &Prepared, options: &RefineOptions, steps: usize) -> FitOptions {
+pub(crate) fn settings(prepared: &Prepared, options: &RefineOptions, steps: usize) -> FitOptions {
     let derivatives = Derivatives {
         thresholds: options.thresholds,
         half_widths: options.half_widths,
@@ -169,7 +166,7 @@ pub(super) fn settings(prepared: &Prepared, options: &RefineOptions, steps: usiz
 /// Refines all parts of a point at once.
 ///
 /// `hopeless` is a cost: a fit that has not come below it after a few steps is left there.
-pub(super) fn joint(
+pub(crate) fn joint(
     point: Point,
     prepared: &Prepared,
     options: &RefineOptions,
@@ -276,7 +273,7 @@ fn balance(deviations: &[f64]) -> Vec<f64> {
 
 impl Refined {
     /// The information criterion's ingredients: the covariance.
-    pub(super) fn uncertainty(
+    pub(crate) fn uncertainty(
         &self,
         prepared: &Prepared,
         progress: Progress,
@@ -300,7 +297,7 @@ impl Refined {
     }
 
     /// Drops deadzones that another one or the identity replaces, as long as the fit stays as good.
-    pub(super) fn drop_undetermined(
+    pub(crate) fn drop_undetermined(
         &mut self,
         prepared: &Prepared,
         progress: Progress,
@@ -327,7 +324,7 @@ impl Refined {
     }
 
     /// Drops plays and deadzones without weight, and works out how sure the rest is.
-    pub(super) fn finish(
+    pub(crate) fn finish(
         mut self,
         prepared: &Prepared,
         progress: Progress,
@@ -353,9 +350,10 @@ impl Refined {
         });
         let mut squares = vec![0.0; prepared.means.len()];
         for (residual, experiment) in residuals.iter().zip(record.experiments()) {
-            let scored = residual.rows(experiment.warmup, residual.nrows() - experiment.warmup);
-            for (sum, column) in squares.iter_mut().zip(scored.column_iter()) {
-                *sum += column.norm_squared();
+            for scored in experiment.scored_rows(residual) {
+                for (sum, column) in squares.iter_mut().zip(scored.column_iter()) {
+                    *sum += column.norm_squared();
+                }
             }
         }
         let rms = |sum: f64| (sum / record.scored() as f64).sqrt();

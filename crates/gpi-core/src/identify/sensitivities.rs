@@ -2,12 +2,11 @@
 
 use super::linearization::{Linearization, Weighting};
 use super::point::{Layout, Point};
-use super::preparation::{Prepared, rescale};
+use super::preparation::Prepared;
 use super::refine::{RefineOptions, require_match, settings};
 use super::sensitivity::Parameters;
 use super::stream::Stream;
 use super::{Progress, report};
-use crate::linear::Sections;
 use crate::{Error, Matrix, Model, Record};
 use nalgebra::DVector;
 
@@ -45,8 +44,7 @@ pub fn sensitivities(
     require_match(model, record)?;
     let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
     let prepared = Prepared::new(record, channels)?;
-    let mut point = prepared.point(Sections::from_delayed_state_space(model.linear())?);
-    rescale(&mut point);
+    let mut point = prepared.point_of(model)?;
     for offsets in &mut point.offsets {
         *offsets = Matrix::zeros(options.offset_knots.max(1), prepared.means.len());
         for (output, mut column) in offsets.column_iter_mut().enumerate() {
@@ -58,10 +56,10 @@ pub fn sensitivities(
     let kept = point.estimated(&layout, &prepared.record, freedom);
     let mut jacobians = Vec::new();
     for (index, experiment) in prepared.record.experiments().iter().enumerate() {
-        let samples = experiment.input.nrows() - experiment.warmup;
+        let samples = experiment.scored();
         let mut own = vec![Matrix::zeros(samples, kept.len()); prepared.means.len()];
         let mut first = 0;
-        Stream::new(&point, &layout, freedom.derivatives, experiment, index).run(&mut |rows| {
+        Stream::new(&point, &layout, freedom.derivatives, experiment, index)?.run(&mut |rows| {
             report(progress, "sensitivities", 0.0)?;
             for (jacobian, regressor) in own.iter_mut().zip(rows.regressors) {
                 for (column, &i) in kept.iter().enumerate() {
@@ -90,7 +88,7 @@ pub fn sensitivities(
 }
 
 /// Names and values of all unknowns, offsets with the means that were taken from the outputs.
-pub(super) fn names_and_values(
+pub(crate) fn names_and_values(
     point: &Point,
     layout: &Layout,
     prepared: &Prepared,

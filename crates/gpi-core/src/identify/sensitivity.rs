@@ -1,13 +1,14 @@
 //! The output of one hysteresis and its derivatives, streamed sample by sample.
 
 use crate::Hysteresis;
+use crate::effects::Block;
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading, play};
 
 /// Parameters of one hysteresis: `z = sum_j g_j Z_{eta_j}(u)`, then plays.
 ///
 /// The first threshold is 0, whose one-sided deadzone is the identity; the first half-width is 0 too.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Parameters {
+pub(crate) struct Parameters {
     pub reading: Reading,
     pub thresholds: Vec<f64>,
     pub slopes: Vec<f64>,
@@ -17,7 +18,7 @@ pub(super) struct Parameters {
 
 impl Parameters {
     /// v = Z_0(u) on the given grid: the identity for one-sided deadzones.
-    pub(super) fn identity(
+    pub(crate) fn identity(
         reading: Reading,
         mut thresholds: Vec<f64>,
         half_widths: Vec<f64>,
@@ -34,7 +35,7 @@ impl Parameters {
 
     /// The parameters of an operator; the identity and the play of half-width zero are added where
     /// they are missing.
-    pub(super) fn from_operator(hysteresis: &Hysteresis) -> Self {
+    pub(crate) fn from_operator(hysteresis: &Hysteresis) -> Self {
         let with_zero = |places: &[f64], values: &[f64]| {
             let mut pairs: Vec<_> =
                 places.iter().copied().zip(values.iter().copied()).filter(|p| p.0 != 0.0).collect();
@@ -50,20 +51,20 @@ impl Parameters {
     }
 
     /// z for one sample of u.
-    pub(super) fn envelope(&self, previous: f64, u: f64) -> f64 {
+    pub(crate) fn envelope(&self, previous: f64, u: f64) -> f64 {
         let zones = self.thresholds.iter().zip(&self.slopes);
         zones.map(|(&eta, slope)| slope * self.reading.zone(eta, previous, u)).sum()
     }
 
     /// Smallest and largest z of samples of u.
-    pub(super) fn envelope_range(&self, u: impl Iterator<Item = f64>) -> (f64, f64) {
+    pub(crate) fn envelope_range(&self, u: impl Iterator<Item = f64>) -> (f64, f64) {
         let mut previous = 0.0;
         u.map(|value| self.envelope(std::mem::replace(&mut previous, value), value))
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)))
     }
 
     /// The operator, without plays and deadzones of weight zero.
-    pub(super) fn to_operator(&self) -> Result<Hysteresis, crate::Error> {
+    pub(crate) fn to_operator(&self) -> Result<Hysteresis, crate::Error> {
         let zones = self.thresholds.iter().copied().zip(self.slopes.iter().copied());
         let mut zones: Vec<_> = zones.filter(|&(eta, slope)| eta == 0.0 || slope != 0.0).collect();
         zones.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -75,20 +76,64 @@ impl Parameters {
     }
 
     /// Replaces samples of u by those of v; `start` as in [`Sensitivity::new`].
-    pub(super) fn apply(&self, start: Option<&[f64]>, signal: &mut [f64]) {
-        let wanted = Derivatives::default();
-        let mut sensitivity = Sensitivity::new(self, start, wanted);
-        let mut row = vec![0.0; Sensitivity::columns(self, wanted)];
+    pub(crate) fn apply(&self, start: Option<&[f64]>, beside: &Beside, signal: &mut [f64]) {
+        let n = self.half_widths.len();
+        let (mut plays, mut start) = (vec![0.0; n], start);
+        let mut previous = None;
         for value in signal {
-            sensitivity.step(*value, &mut row);
-            *value = row[0];
+            let u = *value;
+            let speed = beside.speed(previous, u);
+            let z = self.envelope(previous.unwrap_or(0.0), u);
+            previous = Some(u);
+            if let Some(sides) = start.take() {
+                let places = sides.iter().zip(&self.half_widths).map(|(side, r)| z + side * r);
+                plays.iter_mut().zip(places).for_each(|(play, place)| *play = place);
+            }
+            let mut v = 0.0;
+            for i in 0..n {
+                let r = self.half_widths[i];
+                plays[i] = play(beside.width(r, speed).0, z, plays[i]);
+                v += self.weights[i] * beside.read(r, plays[i]).0;
+            }
+            *value = v;
         }
+    }
+}
+
+/// Effects that act on the plays of one input.
+#[derive(Clone, Default)]
+pub(crate) struct Beside<'a> {
+    pub blocks: Vec<&'a dyn Block>,
+    /// Sampling rate in Hz.
+    pub rate: f64,
+}
+
+impl Beside<'_> {
+    /// |du/dt|; at the first sample the input stands.
+    fn speed(&self, previous: Option<f64>, u: f64) -> f64 {
+        previous.map_or(0.0, |previous| (u - previous).abs() * self.rate)
+    }
+
+    /// A play's half-width, and its derivative by the half-width at rest.
+    fn width(&self, half_width: f64, speed: f64) -> (f64, f64) {
+        self.blocks.iter().fold((half_width, 1.0), |(width, slope), block| {
+            let (width, own) = block.width(width, speed);
+            (width, slope * own)
+        })
+    }
+
+    /// What a play's place is read as, and the derivative.
+    fn read(&self, half_width: f64, place: f64) -> (f64, f64) {
+        self.blocks.iter().fold((place, 1.0), |(place, slope), block| {
+            let (place, own) = block.read(half_width, place);
+            (place, slope * own)
+        })
     }
 }
 
 /// Which derivatives are wanted besides those by the weights and slopes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Derivatives {
+pub(crate) struct Derivatives {
     pub thresholds: bool,
     pub half_widths: bool,
     pub starts: bool,
@@ -100,13 +145,16 @@ pub(super) struct Derivatives {
 /// A play's derivative by z is 1 while it slides and 0 while it sticks, so what reaches v from a
 /// parameter of the envelope is its effect on z at the time each play last slid. By its half-width the
 /// derivative is -1 after sliding up and +1 after sliding down.
-pub(super) struct Sensitivity<'a> {
+pub(crate) struct Sensitivity<'a> {
     parameters: &'a Parameters,
     wanted: Derivatives,
+    beside: Beside<'a>,
+    /// Whether plays are read through curves, so that the sums change while they stick.
+    curved: bool,
     /// Taken at the first sample.
     start: Option<&'a [f64]>,
     /// u(k-1), which directional deadzones compare with.
-    previous: f64,
+    previous: Option<f64>,
     plays: Vec<f64>,
     /// Whether play i still remembers its start value.
     remembers: Vec<bool>,
@@ -123,17 +171,20 @@ pub(super) struct Sensitivity<'a> {
 impl<'a> Sensitivity<'a> {
     /// Starts from rest, or with F_i(-1) = z(0) + s_i r_i for `start` s_i in [-1, 1]: a play stands
     /// beside z, wherever the envelope takes z.
-    pub(super) fn new(
+    pub(crate) fn new(
         parameters: &'a Parameters,
         start: Option<&'a [f64]>,
         wanted: Derivatives,
+        beside: Beside<'a>,
     ) -> Self {
         let n = parameters.half_widths.len();
         let zones = parameters.thresholds.len() * if wanted.thresholds { 2 } else { 1 };
         Self {
             parameters,
             wanted,
-            previous: 0.0,
+            curved: beside.blocks.iter().any(|block| block.reads()),
+            beside,
+            previous: None,
             start,
             plays: vec![0.0; n],
             remembers: vec![start.is_some(); n],
@@ -146,7 +197,7 @@ impl<'a> Sensitivity<'a> {
 
     /// How many values [`Sensitivity::step`] writes: v, weights, slopes, thresholds, half-widths,
     /// starts.
-    pub(super) fn columns(parameters: &Parameters, wanted: Derivatives) -> usize {
+    pub(crate) fn columns(parameters: &Parameters, wanted: Derivatives) -> usize {
         let (n, zones) = (parameters.half_widths.len(), parameters.thresholds.len());
         let times = |count: usize, wanted: bool| if wanted { count } else { 0 };
         1 + n
@@ -157,21 +208,23 @@ impl<'a> Sensitivity<'a> {
     }
 
     /// One sample: `v`, then dv/d of the weights, slopes, thresholds, half-widths and start values.
-    pub(super) fn step(&mut self, u: f64, output: &mut [f64]) {
+    pub(crate) fn step(&mut self, u: f64, output: &mut [f64]) {
         let Parameters { reading, thresholds, slopes, half_widths, weights } = self.parameters;
         let (n, zones) = (half_widths.len(), thresholds.len());
         let mut z = 0.0;
+        let speed = self.beside.speed(self.previous, u);
+        let previous = self.previous.unwrap_or(0.0);
         for j in 0..zones {
-            let value = reading.zone(thresholds[j], self.previous, u);
+            let value = reading.zone(thresholds[j], previous, u);
             self.present[j] = value;
             if self.wanted.thresholds {
-                let falling = *reading == Reading::Directional && u < self.previous;
+                let falling = *reading == Reading::Directional && u < previous;
                 let side = if falling { 1.0 } else { -1.0 };
                 self.present[zones + j] = if value == 0.0 { 0.0 } else { side * slopes[j] };
             }
             z += slopes[j] * value;
         }
-        self.previous = u;
+        self.previous = Some(u);
         if let Some(start) = self.start.take() {
             self.stand(z, start);
         }
@@ -181,10 +234,11 @@ impl<'a> Sensitivity<'a> {
         let mut v = 0.0;
         for i in 0..n {
             let previous = self.plays[i];
-            let value = play(half_widths[i], z, previous);
+            let (width, growth) = self.beside.width(half_widths[i], speed);
+            let value = play(width, z, previous);
             if value != previous || half_widths[i] == 0.0 {
                 self.remembers[i] = false;
-                self.directions[i] = if value > previous { -1.0 } else { 1.0 };
+                self.directions[i] = if value > previous { -growth } else { growth };
                 if weights[i] != 0.0 {
                     let held = &mut self.held[held_size * i..held_size * (i + 1)];
                     for (sum, (&present, &held)) in
@@ -196,18 +250,33 @@ impl<'a> Sensitivity<'a> {
                 }
             }
             self.plays[i] = value;
-            v += weights[i] * value;
-            output[1 + i] = value;
+            let (read, slope) = self.beside.read(half_widths[i], value);
+            v += weights[i] * read;
+            output[1 + i] = read;
             if self.wanted.half_widths {
-                output[widths + i] = weights[i] * self.directions[i];
+                output[widths + i] = weights[i] * slope * self.directions[i];
             }
             if self.wanted.starts {
                 let moved = if self.remembers[i] { half_widths[i] } else { 0.0 };
-                output[starts + i] = weights[i] * moved;
+                output[starts + i] = weights[i] * slope * moved;
             }
+        }
+        if self.curved {
+            self.sum_through_curves();
         }
         output[0] = v;
         output[1 + n..widths].copy_from_slice(&self.sums);
+    }
+
+    /// The sums anew, with the slopes of the curves at the plays' present places.
+    fn sum_through_curves(&mut self) {
+        let Parameters { half_widths, weights, .. } = self.parameters;
+        self.sums.fill(0.0);
+        let held = self.held.chunks_exact(self.present.len());
+        for (i, held) in held.enumerate().filter(|(i, _)| weights[*i] != 0.0) {
+            let slope = weights[i] * self.beside.read(half_widths[i], self.plays[i]).1;
+            self.sums.iter_mut().zip(held).for_each(|(sum, value)| *sum += slope * value);
+        }
     }
 
     /// Puts the plays beside the first z, with which they move.
@@ -232,7 +301,7 @@ mod tests {
 
     fn run(parameters: &Parameters, start: &[f64], u: &[f64]) -> Vec<Vec<f64>> {
         let wanted = Derivatives { thresholds: true, half_widths: true, starts: true };
-        let mut sensitivity = Sensitivity::new(parameters, Some(start), wanted);
+        let mut sensitivity = Sensitivity::new(parameters, Some(start), wanted, Beside::default());
         let mut row = vec![0.0; Sensitivity::columns(parameters, wanted)];
         u.iter()
             .map(|&value| {

@@ -1,8 +1,10 @@
 //! One experiment streamed through the hysteresis of every input, through G, and through all of their
 //! derivatives.
 
+use super::free_run::Sensing;
 use super::point::{Layout, Past, Point};
 use super::sensitivity::{Derivatives, Sensitivity};
+use crate::effects::Stage;
 use crate::linear::{Section, Sections};
 use crate::{Error, Experiment, Matrix};
 use nalgebra::DVector;
@@ -11,7 +13,7 @@ use nalgebra::DVector;
 const BLOCK: usize = 1024;
 
 /// Residuals and derivatives of a run of scored samples of one experiment.
-pub(super) struct Rows<'a> {
+pub(crate) struct Rows<'a> {
     /// For each output, (unknowns, samples).
     pub regressors: &'a [Matrix],
     /// Measured minus simulated, (outputs, samples).
@@ -19,7 +21,7 @@ pub(super) struct Rows<'a> {
 }
 
 /// Streams one experiment and hands its rows on block by block.
-pub(super) struct Stream<'a> {
+pub(crate) struct Stream<'a> {
     point: &'a Point,
     layout: &'a Layout,
     experiment: &'a Experiment,
@@ -30,6 +32,23 @@ pub(super) struct Stream<'a> {
     /// Each of these columns through G, `[input]` (columns, outputs).
     responses: Vec<Matrix>,
     sections: Vec<SectionState<'a>>,
+    /// The drive that reaches the hysteresis.
+    drive: Matrix,
+    /// Derivatives by the values of effects, `[effect][value]`.
+    effects: Vec<Vec<Matrix>>,
+    /// What effects add to the output, (samples, outputs).
+    added: Matrix,
+    feedback: Feedback,
+}
+
+/// How changes go around the loop of a displacement that acts back.
+struct Feedback {
+    /// Whether anything does.
+    closed: bool,
+    /// What each state of G changes by with each unknown, (unknowns, order).
+    tangents: Matrix,
+    /// What the displacement drives each state with, and the slope, (order, 2).
+    drives: Matrix,
 }
 
 /// What one section remembers.
@@ -136,13 +155,13 @@ impl<'a> SectionState<'a> {
 }
 
 impl<'a> Stream<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         point: &'a Point,
         layout: &'a Layout,
         wanted: Derivatives,
         experiment: &'a Experiment,
         index: usize,
-    ) -> Self {
+    ) -> Result<Self, Error> {
         let Past { plays, state, .. } = &point.pasts[index];
         let sensitivities: Vec<_> = point
             .channels
@@ -150,7 +169,7 @@ impl<'a> Stream<'a> {
             .enumerate()
             .map(|(input, channel)| {
                 let start = plays.as_ref().map(|plays| &plays[input][..]);
-                Sensitivity::new(channel, start, wanted)
+                Sensitivity::new(channel, start, wanted, point.beside(input))
             })
             .collect();
         let sizes: Vec<_> =
@@ -163,7 +182,22 @@ impl<'a> Stream<'a> {
             first += section.order();
             SectionState::new(section, &sizes, free)
         });
-        Self {
+        let closed = point.loops().next().is_some();
+        let order = point.dynamics.order();
+        let feedback = Feedback {
+            closed,
+            tangents: Matrix::zeros(if closed { layout.len } else { 0 }, order),
+            drives: Matrix::zeros(order, 2),
+        };
+        Ok(Self {
+            drive: point.drive(experiment),
+            effects: point.effect_columns(experiment, index)?,
+            added: {
+                let mut added = Matrix::zeros(experiment.input.nrows(), outputs);
+                point.add(experiment, &mut added);
+                added
+            },
+            feedback,
             sections: sections.collect(),
             point,
             layout,
@@ -172,26 +206,33 @@ impl<'a> Stream<'a> {
             sensitivities,
             columns: sizes.iter().map(|&size| DVector::zeros(size)).collect(),
             responses: sizes.iter().map(|&size| Matrix::zeros(size, outputs)).collect(),
-        }
+        })
     }
 
     /// Hands the rows of all scored samples on.
-    pub(super) fn run(
+    pub(crate) fn run(
         &mut self,
         consume: &mut dyn FnMut(Rows) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let outputs = self.point.dynamics.outputs();
         let (warmup, samples) = (self.experiment.warmup, self.experiment.input.nrows());
-        let block = BLOCK.min(samples - warmup);
+        let block = BLOCK.min(self.experiment.scored());
+        let mut scored = self.experiment.scored_runs().peekable();
         let mut regressors = vec![Matrix::zeros(self.layout.len, block); outputs];
         let mut residuals = Matrix::zeros(outputs, block);
         let mut filled = 0;
+        let mut sensing: Vec<Sensing> = Vec::new();
+        // Also before the first scored sample, where the displacement leaves traces.
+        let traced = self.feedback.closed || self.point.at_stage(Stage::Output).next().is_some();
+        let mut unscored = vec![0.0; if traced { self.layout.len } else { 0 }];
         for k in 0..samples {
+            while scored.next_if(|run| run.end <= k).is_some() {}
+            let counts = scored.peek().is_some_and(|run| run.contains(&k));
             let at = k.saturating_sub(self.point.dynamics.delay);
             for (input, sensitivity) in self.sensitivities.iter_mut().enumerate() {
                 // what the delay brings in first is the time in which nothing moved
                 if at > 0 || k == 0 {
-                    let u = self.experiment.input[(at, input)];
+                    let u = self.drive[(at, input)];
                     sensitivity.step(u, self.columns[input].as_mut_slice());
                 }
             }
@@ -199,20 +240,43 @@ impl<'a> Stream<'a> {
                 self.sections.iter_mut().for_each(|section| section.stand(&self.columns));
             }
             if k == warmup {
-                self.sections.iter_mut().for_each(|state| state.free.copy_from(&state.start));
+                self.sections.iter_mut().for_each(|state| state.free += &state.start);
             }
-            if k >= warmup {
+            if counts || traced {
                 self.respond();
-                for (output, regressor) in regressors.iter_mut().enumerate() {
-                    let mut row = regressor.column_mut(filled);
-                    let simulated = self.fill(output, k, row.as_mut_slice());
-                    residuals[(output, filled)] = self.experiment.output[(k, output)] - simulated;
+            }
+            if k == 0 {
+                let first = |output| {
+                    Sensing::new(self.point, output, self.displacement(output), self.layout.len)
+                };
+                sensing = (0..outputs).map(first).collect();
+            }
+            let moment = self.point.moment(k, &[]);
+            for output in 0..outputs {
+                if counts || (traced && k >= warmup) {
+                    let mut own = regressors[output].column_mut(filled.min(block - 1));
+                    let row = if counts { own.as_mut_slice() } else { &mut unscored[..] };
+                    let displacement = self.fill(output, row);
+                    self.turn(output, displacement, Some(row));
+                    let sensed = sensing[output].step(displacement, Some(row), moment);
+                    if counts {
+                        let simulated = sensed + self.fill_added(output, k, row);
+                        let measured = self.experiment.output[(k, output)];
+                        residuals[(output, filled)] = measured - simulated;
+                    }
+                } else if traced {
+                    let displacement = self.displacement(output);
+                    self.turn(output, displacement, None);
+                    sensing[output].step(displacement, None, moment);
                 }
+            }
+            if counts {
                 filled += 1;
             }
             self.sections.iter_mut().for_each(|section| section.step(&self.columns));
-            if k >= warmup {
+            if k >= warmup || self.feedback.closed {
                 self.sections.iter_mut().for_each(SectionState::relax);
+                self.kick();
             }
             if filled == block || (k + 1 == samples && filled > 0) {
                 if filled < block {
@@ -244,8 +308,93 @@ impl<'a> Stream<'a> {
         }
     }
 
-    /// Writes the derivatives of one output sample; returns the output itself.
-    fn fill(&self, output: usize, k: usize, row: &mut [f64]) -> f64 {
+    /// The displacement of one output.
+    fn displacement(&self, output: usize) -> f64 {
+        let driven: f64 = self.responses.iter().map(|response| response[(0, output)]).sum();
+        let own = |state: &SectionState| (state.section.c.row(output) * &state.free)[0];
+        driven + self.sections.iter().map(own).sum::<f64>()
+    }
+
+    /// Adds what has come around the loop to a row, and takes what acts back from this sample.
+    fn turn(&mut self, output: usize, displacement: f64, row: Option<&mut [f64]>) {
+        if !self.feedback.closed {
+            return;
+        }
+        self.feedback.drives.fill(0.0);
+        for effect in self.point.loops().filter(|e| e.block().channel() == output) {
+            for (i, (drive, slope)) in effect.block().feedback(displacement).into_iter().enumerate()
+            {
+                self.feedback.drives[(i, 0)] += drive;
+                self.feedback.drives[(i, 1)] += slope;
+            }
+        }
+        let Some(row) = row else { return };
+        let (tangents, drives) = (&mut self.feedback.tangents, &self.feedback.drives);
+        let mut first = 0;
+        for SectionState { section, .. } in &self.sections {
+            for j in 0..section.order() {
+                let c = section.c[(output, j)];
+                if c != 0.0 {
+                    let column = tangents.column(first + j);
+                    row.iter_mut().zip(column.iter()).for_each(|(value, own)| *value += c * own);
+                }
+            }
+            first += section.order();
+        }
+        let mut first = 0;
+        for SectionState { section, matrix, .. } in &self.sections {
+            let n = section.order();
+            let mut own = tangents.columns_mut(first, n);
+            let moved = &own * matrix.transpose();
+            own.copy_from(&moved);
+            for j in 0..n {
+                let slope = drives[(first + j, 1)];
+                let mut column = own.column_mut(j);
+                column.iter_mut().zip(row.iter()).for_each(|(own, value)| *own += slope * value);
+            }
+            first += n;
+        }
+    }
+
+    /// Drives the states with what acts back.
+    fn kick(&mut self) {
+        if !self.feedback.closed {
+            return;
+        }
+        let mut first = 0;
+        for state in &mut self.sections {
+            let order = state.section.order();
+            state.free += self.feedback.drives.view((first, 0), (order, 1));
+            first += order;
+        }
+    }
+
+    /// Writes the derivatives of what is added behind the output stage, and by the values of effects;
+    /// returns what is added.
+    fn fill_added(&self, output: usize, k: usize, row: &mut [f64]) -> f64 {
+        let layout = self.layout;
+        let mut added = self.added[(k, output)];
+        let knots = &self.point.offsets[self.index];
+        for (column, offsets) in knots.column_iter().enumerate() {
+            let first = layout.offsets[self.index].start + column * knots.nrows();
+            row[first..first + knots.nrows()].fill(0.0);
+            if column == output {
+                for (knot, weight) in hats(k, self.experiment.input.nrows(), knots.nrows()) {
+                    row[first + knot] = weight;
+                    added += weight * offsets[knot];
+                }
+            }
+        }
+        for (columns, unknowns) in self.effects.iter().zip(&layout.effects) {
+            for (column, i) in columns.iter().zip(unknowns.clone()) {
+                row[i] = column[(k, output)];
+            }
+        }
+        added
+    }
+
+    /// Writes the derivatives of the displacement of one output; returns the displacement itself.
+    fn fill(&self, output: usize, row: &mut [f64]) -> f64 {
         let layout = self.layout;
         let mut simulated = 0.0;
         for (input, response) in self.responses.iter().enumerate() {
@@ -274,17 +423,6 @@ impl<'a> Stream<'a> {
                 row[i] = if column % outputs == output { self.v(column / outputs) } else { 0.0 };
             }
         }
-        let knots = &self.point.offsets[self.index];
-        for (column, offsets) in knots.column_iter().enumerate() {
-            let first = layout.offsets[self.index].start + column * knots.nrows();
-            row[first..first + knots.nrows()].fill(0.0);
-            if column == output {
-                for (knot, weight) in hats(k, self.experiment.input.nrows(), knots.nrows()) {
-                    row[first + knot] = weight;
-                    simulated += weight * offsets[knot];
-                }
-            }
-        }
         simulated
     }
 
@@ -307,18 +445,20 @@ impl<'a> Stream<'a> {
         for (state, unknowns) in self.sections.iter().zip(&layout.sections) {
             let SectionState { section, gain, standing, .. } = state;
             let order = section.order();
+            // what stands beside G is no part of the held gain
+            let own = |still: f64| if section.beside.is_none() { still } else { 0.0 };
             for (j, i) in unknowns.a.clone().enumerate() {
-                let still: f64 = held.iter().map(|&(k, v)| standing[(0, k)] * v).sum();
+                let still: f64 = own(held.iter().map(|&(k, v)| standing[(0, k)] * v).sum());
                 row[i] = gain[(output, j)] * still - state.seen(output, j, state.fed_back);
             }
             for (place, i) in unknowns.b.clone().enumerate() {
                 let (input, j) = (place / order, place % order);
-                let still = held.iter().find(|h| h.0 == input).map_or(0.0, |h| h.1);
+                let still = own(held.iter().find(|h| h.0 == input).map_or(0.0, |h| h.1));
                 row[i] = state.seen(output, j, state.driven[input]) - gain[(output, j)] * still;
             }
             for (place, i) in unknowns.c.clone().enumerate() {
                 let j = place / outputs;
-                let still: f64 = held.iter().map(|&(k, v)| standing[(j, k)] * v).sum();
+                let still: f64 = own(held.iter().map(|&(k, v)| standing[(j, k)] * v).sum());
                 row[i] = if place % outputs == output { state.state(j) - still } else { 0.0 };
             }
             let c = section.c.row(output);
@@ -339,7 +479,7 @@ impl<'a> Stream<'a> {
 }
 
 /// The knots beside sample k of `samples`, with their weights in linear interpolation.
-pub(super) fn hats(k: usize, samples: usize, knots: usize) -> impl Iterator<Item = (usize, f64)> {
+pub(crate) fn hats(k: usize, samples: usize, knots: usize) -> impl Iterator<Item = (usize, f64)> {
     let place = k as f64 / (samples.max(2) - 1) as f64 * (knots - 1) as f64;
     let left = (place as usize).min(knots.saturating_sub(2));
     let right = place - left as f64;

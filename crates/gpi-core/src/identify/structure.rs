@@ -34,7 +34,7 @@ pub struct Candidate {
 }
 
 /// Compares structures by the information criterion.
-pub(super) struct Search<'a> {
+pub(crate) struct Search<'a> {
     prepared: &'a Prepared<'a>,
     half_widths: Option<Grid>,
     thresholds: Option<Grid>,
@@ -42,11 +42,14 @@ pub(super) struct Search<'a> {
     pub candidates: Vec<Candidate>,
     /// What each candidate became, and how coloured its residual is.
     refined: Vec<(Refined, f64)>,
+    /// Whether poles that are slower than a mechanical stage's dynamics rule a candidate out: they follow
+    /// creep and disturbances.
+    pub fast: bool,
 }
 
 impl<'a> Search<'a> {
     /// What the user gives by value is not moved.
-    pub(super) fn new(prepared: &'a Prepared<'a>, options: &IdentifyOptions) -> Self {
+    pub(crate) fn new(prepared: &'a Prepared<'a>, options: &IdentifyOptions) -> Self {
         let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_)));
         Self {
             prepared,
@@ -60,6 +63,7 @@ impl<'a> Search<'a> {
             },
             candidates: Vec::new(),
             refined: Vec::new(),
+            fast: false,
         }
     }
 
@@ -77,7 +81,7 @@ impl<'a> Search<'a> {
     }
 
     /// Climbs down the ladder before the dynamics of `seed` until two steps have gained nothing.
-    pub(super) fn climb(&mut self, seed: &Point, progress: Progress) -> Result<(), Error> {
+    pub(crate) fn climb(&mut self, seed: &Point, progress: Progress) -> Result<(), Error> {
         let (mut worse, mut least) = (0, f64::INFINITY);
         for (half_widths, thresholds) in self.ladder() {
             let point = self.placed(seed, &half_widths, &thresholds, progress)?;
@@ -94,7 +98,7 @@ impl<'a> Search<'a> {
 
     /// Tries orders below the best one, then above, until they gain nothing. `dynamics` realizes G of
     /// an order from a record whose input is v.
-    pub(super) fn orders(
+    pub(crate) fn orders(
         &mut self,
         dynamics: &mut dyn FnMut(&Record, usize) -> Result<Sections, Error>,
         progress: Progress,
@@ -144,7 +148,7 @@ impl<'a> Search<'a> {
     }
 
     /// Tries a first-order lag behind the best hysteresis, with the same dead time and with less.
-    pub(super) fn lag(&mut self, progress: Progress) -> Result<(), Error> {
+    pub(crate) fn lag(&mut self, progress: Progress) -> Result<(), Error> {
         /// A pole in the middle of where lags of a few samples have theirs.
         const POLE: f64 = 0.5;
         /// exp(-1/7): no longer memory than the longest delay. A slower lag follows drift and creep,
@@ -172,10 +176,11 @@ impl<'a> Search<'a> {
     }
 
     /// Refines a point; says whether it is better than all before.
-    pub(super) fn offer(&mut self, point: Point, progress: Progress) -> Result<bool, Error> {
+    pub(crate) fn offer(&mut self, point: Point, progress: Progress) -> Result<bool, Error> {
         /// A candidate whose rms is a fifth larger after a few steps is given up.
         const HOPELESS: f64 = 1.44;
-        let costs = self.refined.iter().map(|(refined, _)| refined.fitted.linearization.cost);
+        let usable = self.refined.iter().filter(|(refined, _)| self.is_usable(refined));
+        let costs = usable.map(|(refined, _)| refined.fitted.linearization.cost);
         let hopeless = HOPELESS * costs.fold(f64::INFINITY, f64::min);
         let refined = joint(point, self.prepared, &self.options, hopeless, progress)?;
         let uncertainty = refined.uncertainty(self.prepared, progress)?;
@@ -203,15 +208,34 @@ impl<'a> Search<'a> {
         let smallest = (0..self.candidates.len())
             .min_by(|&i, &j| self.candidates[i].rms.total_cmp(&self.candidates[j].rms));
         let colour = smallest.map_or(1.0, |place| self.refined[place].1);
-        for candidate in &mut self.candidates {
+        let usable: Vec<bool> = self.refined.iter().map(|(r, _)| self.is_usable(r)).collect();
+        for (candidate, usable) in self.candidates.iter_mut().zip(usable) {
             let deviance = 2.0 * values * candidate.rms.max(f64::MIN_POSITIVE).ln();
             candidate.used = colour * candidate.parameters as f64;
-            candidate.criterion = deviance + candidate.used * values.ln();
+            let penalty = if usable { candidate.used * values.ln() } else { f64::INFINITY };
+            candidate.criterion = deviance + penalty;
         }
     }
 
+    fn is_usable(&self, refined: &Refined) -> bool {
+        /// Of the record's length.
+        const LONGEST_MEMORY: f64 = 0.05;
+        if !self.fast {
+            return true;
+        }
+        let record = &self.prepared.record;
+        let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
+        let swings = LONGEST_MEMORY * longest as f64;
+        let lags = swings.min(crate::effects::SHORTEST_CREEP * record.rate());
+        refined.fitted.point.dynamics.poles().iter().all(|pole| {
+            let memory = -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln();
+            let is_lag = pole.im == 0.0 && pole.re > 0.0;
+            memory < if is_lag { lags } else { swings }
+        })
+    }
+
     /// The place of the candidate with the least criterion.
-    pub(super) fn chosen(&self) -> Option<usize> {
+    pub(crate) fn chosen(&self) -> Option<usize> {
         let criterion = |i: usize| self.candidates[i].criterion;
         (0..self.candidates.len()).min_by(|&i, &j| criterion(i).total_cmp(&criterion(j)))
     }
@@ -222,7 +246,7 @@ impl<'a> Search<'a> {
     }
 
     /// The best candidate's place and what it became, and all candidates.
-    pub(super) fn finish(mut self) -> Option<(usize, Refined, Vec<Candidate>)> {
+    pub(crate) fn finish(mut self) -> Option<(usize, Refined, Vec<Candidate>)> {
         let chosen = self.chosen()?;
         Some((chosen, self.refined.swap_remove(chosen).0, self.candidates))
     }

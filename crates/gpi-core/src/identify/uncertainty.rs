@@ -12,7 +12,7 @@ use nalgebra::DVector;
 
 /// Covariance of the unknowns of a [`Layout`].
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Uncertainty {
+pub(crate) struct Uncertainty {
     /// (unknowns, unknowns); zero for those that are held.
     pub covariance: Matrix,
     /// Directions that the data do not determine, (unknowns, directions), of unit length after scaling
@@ -32,7 +32,7 @@ impl Uncertainty {
     /// `H^-1 M H^-1` with H the Gram matrix of the sensitivities and M that of the score under the
     /// residual's colour: with R the autocovariance of an autoregression 1 / a(q), `J^T R J` is the
     /// Gram matrix of the sensitivities filtered by 1 / a(q).
-    pub(super) fn new(
+    pub(crate) fn new(
         fitted: &Fitted,
         record: &Record,
         options: &FitOptions,
@@ -89,7 +89,7 @@ impl Uncertainty {
     }
 
     /// Standard deviations of the unknowns; NaN where an undetermined direction takes part.
-    pub(super) fn deviations(&self) -> DVector<f64> {
+    pub(crate) fn deviations(&self) -> DVector<f64> {
         /// A share of an undetermined direction that rounding alone does not give.
         const SHARE: f64 = 1e-3;
         DVector::from_fn(self.covariance.nrows(), |i, _| {
@@ -100,7 +100,7 @@ impl Uncertainty {
 
     /// Names and shares of the unknowns in every direction that the data do not determine, the largest
     /// first.
-    pub(super) fn undetermined(&self, names: &[String]) -> Vec<Vec<(String, f64)>> {
+    pub(crate) fn undetermined(&self, names: &[String]) -> Vec<Vec<(String, f64)>> {
         /// Smaller shares than this do not help to see what is mixed up.
         const SHARE: f64 = 0.05;
         let direction = |column: nalgebra::DVectorView<f64>| {
@@ -121,7 +121,7 @@ impl Uncertainty {
     ///
     /// `values` are those of the unknowns: a step stays far below them, also along an axis on which the
     /// data determine nothing.
-    pub(super) fn spread(
+    pub(crate) fn spread(
         &self,
         values_of: &[f64],
         moved: impl Fn(&DVector<f64>) -> Result<Vec<f64>, Error>,
@@ -174,7 +174,7 @@ fn score_gram(
     let root = vectors * Matrix::from_diagonal(&values.map(|value| value.max(0.0).sqrt()));
     let mut equations = NormalEquations::zeros(layout.len, 1);
     for (index, experiment) in record.experiments().iter().enumerate() {
-        let mut stream = Stream::new(point, &layout, freedom.derivatives, experiment, index);
+        let mut stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
         let mut past: Vec<Matrix> =
             colour.coefficients.iter().map(|a| Matrix::zeros(layout.len, a.len())).collect();
         stream.run(&mut |rows| {
@@ -213,7 +213,7 @@ fn score_gram(
 
 /// Eigenvalues (descending) and eigenvectors of a small symmetric matrix: by nalgebra, since faer keeps
 /// a workspace of megabytes, more than a record may take.
-fn descending_eigen(matrix: Matrix) -> (DVector<f64>, Matrix) {
+pub(crate) fn descending_eigen(matrix: Matrix) -> (DVector<f64>, Matrix) {
     let n = matrix.nrows();
     let eigen = matrix.symmetric_eigen();
     let mut order: Vec<usize> = (0..n).collect();

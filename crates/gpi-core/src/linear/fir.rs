@@ -69,7 +69,7 @@ impl Fir {
 /// use gpi_core::{Channel, Experiment, Matrix, Record, linear};
 /// let u = Matrix::from_fn(200, 1, |k, _| ((k * k) as f64 * 0.7).sin());
 /// let y = Matrix::from_fn(200, 1, |k, _| 3.0 + 2.0 * u[k] - if k > 0 { u[k - 1] } else { 0.0 });
-/// let run = Experiment { input: u, output: y, covariates: Matrix::zeros(200, 0), warmup: 0 };
+/// let run = Experiment { input: u, output: y, covariates: Matrix::zeros(200, 0), warmup: 0, held_out: vec![] };
 /// let channel = |name: &str| vec![Channel::new(name, "")];
 /// let record = Record::new(vec![run], 1.0, channel("u"), channel("y"), vec![])?;
 /// let fir = linear::estimate(&record, 3, 0.0)?;

@@ -21,6 +21,8 @@ pub(crate) struct Section {
     pub c: Matrix,
     /// The output that fixes the states' scale.
     pub reference: usize,
+    /// The effect whose section it is; it then stands beside G and is no part of the held DC gain.
+    pub beside: Option<usize>,
 }
 
 /// `G(z) = z^-delay (D + sum of sections)`, each column of G held to a DC gain by D.
@@ -92,7 +94,7 @@ impl Section {
         if let [pole] = *poles {
             let scale = seen[(reference, 0)];
             let c = real(seen.map(|value| value / scale));
-            return Self { a: vec![-pole.re], b: real(driven * scale), c, reference };
+            return Self { a: vec![-pole.re], b: real(driven * scale), c, reference, beside: None };
         }
         let (first, second) = (poles[0], poles[1]);
         let a = vec![-(first + second).re, (first * second).re];
@@ -110,7 +112,7 @@ impl Section {
             c = real(c_transposed.transpose());
         }
         c.set_row(reference, &nalgebra::RowDVector::from_vec(vec![1.0, 0.0]));
-        Self { a, b, c, reference }
+        Self { a, b, c, reference, beside: None }
     }
 }
 
@@ -131,7 +133,7 @@ impl Sections {
         for output in 0..outputs {
             let c = Matrix::from_fn(outputs, 1, |row, _| f64::from(u8::from(row == output)));
             let b = (1.0 - pole) * lagged.d.rows(output, 1);
-            lagged.sections.push(Section { a: vec![-pole], b, c, reference: output });
+            lagged.sections.push(Section { a: vec![-pole], b, c, reference: output, beside: None });
         }
         lagged
     }
@@ -202,9 +204,27 @@ impl Sections {
         self.sections.iter().flat_map(Section::poles).collect()
     }
 
-    /// G(1), (outputs, inputs).
+    /// G(1), (outputs, inputs), without what stands beside G.
     pub(crate) fn dc_gain(&self) -> Matrix {
-        self.sections.iter().fold(self.d.clone(), |sum, s| sum + &s.c * s.standing(&s.b))
+        let own = self.sections.iter().filter(|section| section.beside.is_none());
+        own.fold(self.d.clone(), |sum, s| sum + &s.c * s.standing(&s.b))
+    }
+
+    /// G alone.
+    pub(crate) fn own(&self) -> Self {
+        let mut own = self.clone();
+        own.sections.retain(|section| section.beside.is_none());
+        own
+    }
+
+    /// Adds first- or second-order sections with denominator `a` and numerator `b` from one input to all
+    /// outputs, as those of the effect `beside`.
+    pub(crate) fn push_beside(&mut self, beside: usize, input: usize, a: Vec<f64>, b: &[f64]) {
+        let mut c = Matrix::zeros(self.outputs(), a.len());
+        c[(0, 0)] = 1.0;
+        let mut drive = Matrix::zeros(a.len(), self.inputs());
+        drive.column_mut(input).copy_from_slice(b);
+        self.sections.push(Section { a, b: drive, c, reference: 0, beside: Some(beside) });
     }
 
     /// G(e^jw) at w radians per sample, (outputs, inputs).

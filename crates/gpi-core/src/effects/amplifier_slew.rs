@@ -1,0 +1,87 @@
+//! The amplifier's largest slope.
+
+use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
+
+/// `u_s(k) = u_s(k-1) + clamp(u(k) - u_s(k-1), -s Ts, s Ts)`: the drive cannot change faster than s.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct AmplifierSlew {
+    /// The input that the amplifier drives.
+    pub input: usize,
+    /// s, in the input's unit per second.
+    pub limit: f64,
+}
+
+impl AmplifierSlew {
+    pub(super) const NAME: &'static str = "amplifier-slew";
+    pub(super) const WHAT: &'static str = "the drive cannot change faster than a limit";
+    pub(super) const STAGE: Stage = Stage::Input;
+    pub(super) const DRIVEN: bool = true;
+
+    /// Limits that so many of the record's steps stay below: an amplifier that is slower than most of
+    /// them would be seen at once.
+    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+        const QUANTILES: [f64; 10] = [0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 0.9995];
+        let rate = situation.record.rate();
+        let limits = |input| {
+            let steps = situation.steps(input);
+            let mut limits: Vec<f64> = QUANTILES
+                .iter()
+                .filter_map(|q| steps.get((q * steps.len() as f64) as usize).copied())
+                .collect();
+            limits.dedup();
+            let largest = steps.last().copied().unwrap_or(0.0);
+            limits.retain(|&limit| limit < largest);
+            limits
+                .into_iter()
+                .map(move |step| Candidate::finite(Self { input, limit: step * rate }))
+        };
+        situation.inputs().flat_map(limits).collect()
+    }
+}
+
+impl Block for AmplifierSlew {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn stage(&self) -> Stage {
+        Self::STAGE
+    }
+
+    fn channel(&self) -> usize {
+        self.input
+    }
+
+    fn values(&self) -> Vec<f64> {
+        vec![self.limit]
+    }
+
+    fn set(&mut self, values: &[f64]) {
+        self.limit = values[0];
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        vec![(0.5 * self.limit, 2.0 * self.limit)]
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        vec![1e-5 * self.limit]
+    }
+
+    fn quantities(&self, units: Units) -> Vec<Quantity> {
+        let unit =
+            if units.input.is_empty() { String::new() } else { format!("{}/s", units.input) };
+        vec![Quantity::new("slew_limit", unit, self.limit)]
+    }
+
+    /// The drive itself.
+    fn rest(&self, first: f64, _: Moment) -> Vec<f64> {
+        vec![first]
+    }
+
+    fn drive(&self, state: &mut [f64], input: f64, moment: Moment) -> f64 {
+        let reach = self.limit / moment.rate;
+        state[0] += (input - state[0]).clamp(-reach, reach);
+        state[0]
+    }
+}

@@ -1,0 +1,79 @@
+//! Mechanical play after G.
+
+use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units};
+use crate::operators::play;
+
+/// `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`: the output follows only when the gap is closed.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Backlash {
+    /// The output behind the gap.
+    pub output: usize,
+    /// b, half the gap, in the output's unit.
+    pub half_width: f64,
+}
+
+impl Backlash {
+    pub(super) const NAME: &'static str = "backlash";
+    pub(super) const WHAT: &'static str = "mechanical play after the dynamics";
+    pub(super) const STAGE: Stage = Stage::Output;
+    pub(super) const DRIVEN: bool = true;
+
+    /// Half-widths from a ten-thousandth of the span to a fifth.
+    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+        const COUNT: usize = 12;
+        let blocks = |output| {
+            let span = situation.span(output);
+            (0..COUNT).map(move |i| {
+                let fraction = 1e-4 * 2000.0_f64.powf(i as f64 / (COUNT - 1) as f64);
+                Candidate::finite(Self { output, half_width: fraction * span })
+            })
+        };
+        situation.outputs().flat_map(blocks).collect()
+    }
+}
+
+impl Block for Backlash {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn stage(&self) -> Stage {
+        Self::STAGE
+    }
+
+    fn channel(&self) -> usize {
+        self.output
+    }
+
+    fn values(&self) -> Vec<f64> {
+        vec![self.half_width]
+    }
+
+    fn set(&mut self, values: &[f64]) {
+        self.half_width = values[0];
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        vec![(0.3 * self.half_width, 3.0 * self.half_width)]
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        vec![1e-5 * self.half_width]
+    }
+
+    fn quantities(&self, units: Units) -> Vec<Quantity> {
+        vec![Quantity::new("gap", units.output, 2.0 * self.half_width)]
+    }
+
+    /// The output itself, in the middle of the gap.
+    fn rest(&self, first: f64, _: Moment) -> Vec<f64> {
+        vec![play(self.half_width, first, 0.0)]
+    }
+
+    fn sense(&self, state: &mut [f64], output: f64, _: Moment) -> (f64, Slope) {
+        let before = state[0];
+        state[0] = play(self.half_width, output, before);
+        let slope = if state[0] == before { Slope::Held } else { Slope::Times(1.0) };
+        (state[0], slope)
+    }
+}

@@ -1,0 +1,63 @@
+//! Noise with memory.
+
+use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+
+/// `e(k) = sum_i a_i e(k-i) + w(k)`, w white: what is left remembers itself, and nothing else.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ColouredNoise {
+    /// The output whose noise it is.
+    pub output: usize,
+    /// a_1, a_2, ..
+    pub coefficients: Vec<f64>,
+    /// Standard deviation of w, in the output's unit.
+    pub innovation: f64,
+    /// Standard deviation of e.
+    pub deviation: f64,
+}
+
+impl ColouredNoise {
+    pub(super) const NAME: &'static str = "coloured-noise";
+    pub(super) const WHAT: &'static str = "the noise has memory";
+    pub(super) const STAGE: Stage = Stage::Noise;
+    pub(super) const DRIVEN: bool = false;
+
+    /// None: it is what remains when nothing else explains the residual.
+    pub(super) fn candidates(_: &Situation) -> Vec<Candidate> {
+        Vec::new()
+    }
+}
+
+impl Block for ColouredNoise {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn stage(&self) -> Stage {
+        Self::STAGE
+    }
+
+    fn channel(&self) -> usize {
+        self.output
+    }
+
+    fn values(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    fn set(&mut self, _: &[f64]) {}
+
+    fn steps(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    fn quantities(&self, units: Units) -> Vec<Quantity> {
+        let mut quantities = vec![
+            Quantity::new("innovation", units.output, self.innovation),
+            Quantity::new("deviation", units.output, self.deviation),
+        ];
+        for (i, &a) in self.coefficients.iter().enumerate() {
+            quantities.push(Quantity::new(format!("a[{}]", i + 1), "", a));
+        }
+        quantities
+    }
+}

@@ -1,0 +1,112 @@
+//! Slow relaxation driven by v.
+
+use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+
+/// `y += sum_i c_i L_i v` with first-order lags L_i of unit gain and time constants T_i: after a step the
+/// output goes on by c_i within a few T_i.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Creep {
+    /// The input whose v drives it.
+    pub input: usize,
+    /// T_i in seconds.
+    pub time_constants: Vec<f64>,
+    /// c_i, fractions of the displacement that v leads to at once.
+    pub gains: Vec<f64>,
+    /// Samples by which v arrives late: the dead time of G.
+    pub dead_time: usize,
+}
+
+/// Shorter lags are dynamics.
+pub(crate) const SHORTEST: f64 = 0.03;
+/// Longer ones are a drift in proportion to the integral of v.
+const LONGEST: f64 = 3e3;
+
+impl Creep {
+    pub(super) const NAME: &'static str = "creep";
+    pub(super) const WHAT: &'static str = "slow relaxation driven by the actuator's own motion";
+    pub(super) const STAGE: Stage = Stage::Dynamics;
+    pub(super) const DRIVEN: bool = true;
+
+    /// One, two and three lags between 0.05 s and the record's length.
+    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+        let (low, high) = (0.05, situation.duration());
+        if situation.outputs().len() > 1 || high < 4.0 * low {
+            return Vec::new();
+        }
+        let between = |fraction: f64| low * (high / low).powf(fraction);
+        let mut sets: Vec<Vec<f64>> = (0..9).map(|i| vec![between(f64::from(i) / 8.0)]).collect();
+        sets.push(vec![between(0.3), between(0.8)]);
+        sets.push(vec![between(0.15), between(0.5), between(0.85)]);
+        let block = |input, time_constants: &Vec<f64>| {
+            let gains = vec![0.0; time_constants.len()];
+            let block = Self { input, gains, time_constants: time_constants.clone(), dead_time: 0 };
+            let lags = time_constants.len();
+            Candidate::linear(block, lags..2 * lags)
+        };
+        situation.inputs().flat_map(|input| sets.iter().map(move |set| block(input, set))).collect()
+    }
+}
+
+impl Block for Creep {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn stage(&self) -> Stage {
+        Self::STAGE
+    }
+
+    fn channel(&self) -> usize {
+        self.input
+    }
+
+    fn values(&self) -> Vec<f64> {
+        [&self.time_constants[..], &self.gains[..]].concat()
+    }
+
+    fn set(&mut self, values: &[f64]) {
+        let (times, gains) = values.split_at(values.len() / 2);
+        self.time_constants.copy_from_slice(times);
+        self.gains.copy_from_slice(gains);
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        let times = self.time_constants.iter().map(|time| 1e-5 * time);
+        times.chain(self.gains.iter().map(|_| 1e-3)).collect()
+    }
+
+    fn quantities(&self, _: Units) -> Vec<Quantity> {
+        let mut quantities = Vec::new();
+        for (i, (&time, &gain)) in self.time_constants.iter().zip(&self.gains).enumerate() {
+            quantities.push(Quantity::new(format!("time_constant[{i}]"), "s", time));
+            quantities.push(Quantity::new(format!("gain[{i}]"), "", gain));
+        }
+        quantities
+    }
+
+    fn sections(&self, rate: f64) -> Vec<(Vec<f64>, Vec<f64>)> {
+        let lag = |(time, gain): (&f64, &f64)| {
+            let pole = (-1.0 / (time * rate)).exp();
+            (vec![-pole], vec![gain * (1.0 - pole)])
+        };
+        self.time_constants.iter().zip(&self.gains).map(lag).collect()
+    }
+
+    fn set_sections(&mut self, sections: &[(Vec<f64>, Vec<f64>)], dead_time: usize, rate: f64) {
+        self.dead_time = dead_time;
+        for (i, (a, b)) in sections.iter().enumerate() {
+            let pole = -a[0];
+            self.time_constants[i] = -1.0 / (rate * pole.ln());
+            self.gains[i] = b[0] / (1.0 - pole);
+        }
+    }
+
+    fn dead_time(&self) -> usize {
+        self.dead_time
+    }
+
+    fn section_bounds(&self, rate: f64) -> (f64, f64) {
+        let a1 = |time: f64| -(-1.0 / (time * rate)).exp();
+        (a1(LONGEST), a1(SHORTEST))
+    }
+}

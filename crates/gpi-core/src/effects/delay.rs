@@ -1,0 +1,76 @@
+//! Dead time beyond the linear model's.
+
+use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
+
+/// `u_d(t) = u(t - T)`: the drive arrives T later; between samples u is a straight line.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Delay {
+    /// The input that arrives late.
+    pub input: usize,
+    /// T times the sampling rate.
+    pub samples: f64,
+}
+
+/// A longer dead time is better cut out of the record.
+const LONGEST: f64 = 100.0;
+
+impl Delay {
+    pub(super) const NAME: &'static str = "delay";
+    pub(super) const WHAT: &'static str = "dead time beyond the linear model's";
+    pub(super) const STAGE: Stage = Stage::Input;
+    pub(super) const DRIVEN: bool = true;
+
+    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+        let delays =
+            |input| [1.0, 2.0, 4.0, 8.0].map(|samples| Candidate::finite(Self { input, samples }));
+        situation.inputs().flat_map(delays).collect()
+    }
+}
+
+impl Block for Delay {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn stage(&self) -> Stage {
+        Self::STAGE
+    }
+
+    fn channel(&self) -> usize {
+        self.input
+    }
+
+    fn values(&self) -> Vec<f64> {
+        vec![self.samples]
+    }
+
+    fn set(&mut self, values: &[f64]) {
+        self.samples = values[0];
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        vec![(0.0, LONGEST)]
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        vec![1e-4]
+    }
+
+    fn quantities(&self, _: Units) -> Vec<Quantity> {
+        vec![Quantity::new("delay", "samples", self.samples)]
+    }
+
+    /// The latest inputs, the newest first.
+    fn rest(&self, first: f64, _: Moment) -> Vec<f64> {
+        vec![first; LONGEST as usize + 2]
+    }
+
+    fn drive(&self, state: &mut [f64], input: f64, _: Moment) -> f64 {
+        let needed = self.samples as usize + 2;
+        let state = &mut state[..needed];
+        state.rotate_right(1);
+        state[0] = input;
+        let right = self.samples.fract();
+        (1.0 - right) * state[needed - 2] + right * state[needed - 1]
+    }
+}

@@ -1,0 +1,111 @@
+//! A mode that the linear part lacks.
+
+use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+
+/// `(b1 q^-1 + b2 q^-2) / (1 + a1 q^-1 + a2 q^-2)` from v to y, beside G: one more mode, or two real
+/// poles.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct LinearDynamics {
+    /// The input whose v drives it.
+    pub input: usize,
+    /// a1, a2.
+    pub denominator: Vec<f64>,
+    /// b1, b2.
+    pub numerator: Vec<f64>,
+    /// The sampling rate in Hz.
+    pub rate: f64,
+    /// Samples by which v arrives late: the dead time of G.
+    pub dead_time: usize,
+}
+
+impl LinearDynamics {
+    pub(super) const NAME: &'static str = "linear-dynamics";
+    pub(super) const WHAT: &'static str = "a mode or an order that the linear part lacks";
+    pub(super) const STAGE: Stage = Stage::Dynamics;
+    pub(super) const DRIVEN: bool = true;
+
+    /// Lightly damped modes from a few periods a record to close to half the rate.
+    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+        const MODES: usize = 24;
+        const DAMPING: f64 = 0.03;
+        let rate = situation.record.rate();
+        let (low, high) = ((10.0 / situation.duration()).max(1e-4 * rate), 0.45 * rate);
+        if low >= high || situation.outputs().len() > 1 {
+            return Vec::new();
+        }
+        let mode = move |input: usize, place: usize| {
+            let frequency = low * (high / low).powf(place as f64 / (MODES - 1) as f64);
+            let angle = std::f64::consts::TAU * frequency / rate;
+            let radius = (-DAMPING * angle).exp();
+            let denominator = vec![-2.0 * radius * angle.cos(), radius * radius];
+            Self { input, denominator, numerator: vec![0.0; 2], rate, dead_time: 0 }
+        };
+        let modes = |input| (0..MODES).map(move |place| mode(input, place));
+        situation.inputs().flat_map(modes).map(|mode| Candidate::linear(mode, 2..4)).collect()
+    }
+}
+
+impl Block for LinearDynamics {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn stage(&self) -> Stage {
+        Self::STAGE
+    }
+
+    fn channel(&self) -> usize {
+        self.input
+    }
+
+    fn values(&self) -> Vec<f64> {
+        [&self.denominator[..], &self.numerator[..]].concat()
+    }
+
+    fn set(&mut self, values: &[f64]) {
+        self.denominator.copy_from_slice(&values[..2]);
+        self.numerator.copy_from_slice(&values[2..]);
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        // of the numerator, as much as gives a gain of a ten-thousandth
+        let gain = 1.0 + self.denominator.iter().sum::<f64>();
+        vec![1e-6, 1e-6, 1e-4 * gain, 1e-4 * gain]
+    }
+
+    fn quantities(&self, units: Units) -> Vec<Quantity> {
+        let [a1, a2] = self.denominator[..] else { return Vec::new() };
+        let discriminant = 0.25 * a1 * a1 - a2;
+        let gain = self.numerator.iter().sum::<f64>() / (1.0 + a1 + a2);
+        let gain = Quantity::new("static_gain", Units::ratio(units.output, units.input), gain);
+        let time = |pole: f64| -1.0 / (self.rate * pole.abs().max(f64::MIN_POSITIVE).ln());
+        if discriminant >= 0.0 {
+            let root = discriminant.sqrt();
+            let poles = [-0.5 * a1 + root, -0.5 * a1 - root];
+            let lag = |i: usize| Quantity::new(format!("time_constant[{i}]"), "s", time(poles[i]));
+            return vec![lag(0), lag(1), gain];
+        }
+        // s = rate ln z
+        let (radius, angle) = (a2.sqrt(), (-0.5 * a1 / a2.sqrt()).acos());
+        let (decay, swing) = (-radius.ln(), angle);
+        let natural = decay.hypot(swing);
+        vec![
+            Quantity::new("frequency", "Hz", self.rate * natural / std::f64::consts::TAU),
+            Quantity::new("damping", "", decay / natural),
+            gain,
+        ]
+    }
+
+    fn sections(&self, _: f64) -> Vec<(Vec<f64>, Vec<f64>)> {
+        vec![(self.denominator.clone(), self.numerator.clone())]
+    }
+
+    fn set_sections(&mut self, sections: &[(Vec<f64>, Vec<f64>)], dead_time: usize, _: f64) {
+        self.dead_time = dead_time;
+        (self.denominator, self.numerator) = sections[0].clone();
+    }
+
+    fn dead_time(&self) -> usize {
+        self.dead_time
+    }
+}

@@ -1,0 +1,136 @@
+//! The catalogue of effects: what a declared model (envelope, plays, G, white noise) may lack.
+//!
+//! Every effect is a block in its own place of the chain, steps sample by sample, is saved in model files
+//! and has its parameters refined together with the rest of the model. To add one, write its file and name
+//! it in the catalogue below.
+
+mod amplifier_slew;
+mod backlash;
+mod block;
+mod coloured_noise;
+mod covariate;
+mod creep;
+mod delay;
+mod drift;
+mod gain_drift;
+mod hysteresis_shape;
+mod knots;
+mod linear_dynamics;
+mod outliers;
+mod output_nonlinearity;
+mod periodic_disturbance;
+mod rate_dependence;
+mod situation;
+mod stiffness;
+
+pub use amplifier_slew::AmplifierSlew;
+pub use backlash::Backlash;
+pub use block::{Block, Moment, Quantity, Slope, Stage, Units};
+pub use coloured_noise::ColouredNoise;
+pub use covariate::Covariate;
+pub use creep::Creep;
+pub use delay::Delay;
+pub use drift::Drift;
+pub use gain_drift::GainDrift;
+pub use hysteresis_shape::HysteresisShape;
+pub use linear_dynamics::LinearDynamics;
+pub use outliers::Outliers;
+pub use output_nonlinearity::OutputNonlinearity;
+pub use periodic_disturbance::PeriodicDisturbance;
+pub use rate_dependence::RateDependence;
+pub use stiffness::Stiffness;
+
+pub(crate) use creep::SHORTEST as SHORTEST_CREEP;
+pub(crate) use situation::{Candidate, Situation};
+
+/// Declares [`Effect`], one variant an effect, and [`CATALOGUE`].
+macro_rules! catalogue {
+    ($($effect:ident),* $(,)?) => {
+        /// An effect of the catalogue with its parameters.
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(tag = "name", rename_all = "kebab-case")]
+        pub enum Effect {
+            $(#[doc = concat!("See [`", stringify!($effect), "`].")] $effect($effect)),*
+        }
+
+        impl Effect {
+            /// The block itself.
+            pub fn block(&self) -> &dyn Block {
+                match self { $(Self::$effect(block) => block),* }
+            }
+
+            pub(crate) fn block_mut(&mut self) -> &mut dyn Block {
+                match self { $(Self::$effect(block) => block),* }
+            }
+        }
+
+        $(impl From<$effect> for Effect {
+            fn from(block: $effect) -> Self {
+                Self::$effect(block)
+            }
+        })*
+
+        /// All effects, in the order of the chain.
+        pub const CATALOGUE: &[Entry] = &[$(Entry {
+            name: $effect::NAME,
+            what: $effect::WHAT,
+            stage: $effect::STAGE,
+            driven: $effect::DRIVEN,
+            candidates: $effect::candidates,
+        }),*];
+    };
+}
+
+catalogue! {
+    Delay,
+    AmplifierSlew,
+    RateDependence,
+    HysteresisShape,
+    LinearDynamics,
+    Creep,
+    Stiffness,
+    OutputNonlinearity,
+    GainDrift,
+    Backlash,
+    Drift,
+    PeriodicDisturbance,
+    Covariate,
+    Outliers,
+    ColouredNoise,
+}
+
+/// What the catalogue says of one effect.
+#[derive(Clone, Copy)]
+pub struct Entry {
+    /// Its name in every report and file.
+    pub name: &'static str,
+    /// What it is, in a few words.
+    pub what: &'static str,
+    /// Where it stands in the chain.
+    pub stage: Stage,
+    /// Whether the input (or another measured column) drives it, so that it is the same in another
+    /// experiment; drift and disturbances are not.
+    pub driven: bool,
+    /// The blocks that the search tries before a base model.
+    pub(crate) candidates: fn(&Situation) -> Vec<Candidate>,
+}
+
+impl std::fmt::Debug for Entry {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+        formatter.debug_struct("Entry").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+impl Effect {
+    /// Its entry in the catalogue.
+    pub fn entry(&self) -> &'static Entry {
+        let name = self.block().name();
+        // every variant comes from the catalogue
+        CATALOGUE.iter().find(|entry| entry.name == name).unwrap_or(&CATALOGUE[0])
+    }
+
+    /// Its name, such as `creep`.
+    pub fn name(&self) -> &'static str {
+        self.block().name()
+    }
+}

@@ -1,0 +1,133 @@
+//! A line that the input does not drive.
+
+use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
+use num_complex::Complex64;
+use rustfft::FftPlanner;
+
+/// `y += a cos(2 pi f t) + b sin(2 pi f t)`: mains hum, a pump, a vibration.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct PeriodicDisturbance {
+    /// The output that it adds to.
+    pub output: usize,
+    /// f in Hz.
+    pub frequency: f64,
+    /// a, in the output's unit.
+    pub cosine: f64,
+    /// b, in the output's unit.
+    pub sine: f64,
+    /// Seconds of the record, which say how far the frequency may be off.
+    pub duration: f64,
+    /// The span of the output, which steps are counted from.
+    pub span: f64,
+}
+
+impl PeriodicDisturbance {
+    pub(super) const NAME: &'static str = "periodic-disturbance";
+    pub(super) const WHAT: &'static str =
+        "a line at a fixed frequency that the input does not drive";
+    pub(super) const STAGE: Stage = Stage::Added;
+    pub(super) const DRIVEN: bool = false;
+
+    /// The line of the residual's spectrum that stands out most from its neighbours.
+    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+        let duration = situation.duration();
+        let block = |output: usize| {
+            let frequency = outstanding(situation, output)?;
+            let span = situation.span(output);
+            let block = Self { output, frequency, cosine: 0.0, sine: 0.0, duration, span };
+            Some(Candidate::linear(block, 1..3))
+        };
+        situation.outputs().filter_map(block).collect()
+    }
+}
+
+/// The frequency of the residual's line with the largest power over the median around it, interpolated
+/// between the lines of a Hann window.
+fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
+    /// Slower lines are drift.
+    const FEWEST_PERIODS: usize = 20;
+    const AROUND: usize = 50;
+    let longest = situation.residuals.iter().max_by_key(|residual| residual.nrows())?;
+    let n = longest.nrows();
+    let column = longest.column(output);
+    let mean = column.mean();
+    let window = |k: usize| (std::f64::consts::PI * (k as f64 + 0.5) / n as f64).sin().powi(2);
+    let mut spectrum: Vec<Complex64> = column
+        .iter()
+        .enumerate()
+        .map(|(k, value)| Complex64::new((value - mean) * window(k), 0.0))
+        .collect();
+    FftPlanner::new().plan_fft_forward(n).process(&mut spectrum);
+    let power: Vec<f64> = spectrum[..n / 2].iter().map(Complex64::norm_sqr).collect();
+    let mut best: Option<(f64, usize)> = None;
+    let mut first = FEWEST_PERIODS;
+    // The median of a piece stands for its background.
+    while first + AROUND < power.len() {
+        let last = (first + 2 * AROUND).min(power.len());
+        let mut piece = power[first..last].to_vec();
+        piece.sort_by(f64::total_cmp);
+        let background = piece[piece.len() / 2].max(f64::MIN_POSITIVE);
+        for line in first..last {
+            let ratio = power[line] / background;
+            if best.is_none_or(|(most, _)| ratio > most) {
+                best = Some((ratio, line));
+            }
+        }
+        first += AROUND;
+    }
+    let (_, line) = best?;
+    // Hann's main lobe: the ratio of two neighbouring lines tells where the peak is
+    let size = |place: usize| power.get(place).map_or(0.0, |value| value.sqrt());
+    let (below, here, above) = (size(line - 1), size(line), size(line + 1));
+    let shift = if above > below {
+        (2.0 * above - here) / (above + here).max(f64::MIN_POSITIVE)
+    } else {
+        -(2.0 * below - here) / (below + here).max(f64::MIN_POSITIVE)
+    };
+    Some((line as f64 + shift.clamp(-1.0, 1.0)) * situation.record.rate() / n as f64)
+}
+
+impl Block for PeriodicDisturbance {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn stage(&self) -> Stage {
+        Self::STAGE
+    }
+
+    fn channel(&self) -> usize {
+        self.output
+    }
+
+    fn values(&self) -> Vec<f64> {
+        vec![self.frequency, self.cosine, self.sine]
+    }
+
+    fn set(&mut self, values: &[f64]) {
+        (self.frequency, self.cosine, self.sine) = (values[0], values[1], values[2]);
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        let reach = 0.3 / self.duration;
+        let free = (f64::NEG_INFINITY, f64::INFINITY);
+        vec![(self.frequency - reach, self.frequency + reach), free, free]
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        vec![1e-5 / self.duration, 1e-3 * self.span, 1e-3 * self.span]
+    }
+
+    fn quantities(&self, units: Units) -> Vec<Quantity> {
+        vec![
+            Quantity::new("frequency", "Hz", self.frequency),
+            Quantity::new("amplitude", units.output, self.cosine.hypot(self.sine)),
+            Quantity::new("phase", "rad", (-self.sine).atan2(self.cosine)),
+        ]
+    }
+
+    fn add(&self, _: &mut [f64], moment: Moment) -> f64 {
+        let (sine, cosine) = (std::f64::consts::TAU * self.frequency * moment.time).sin_cos();
+        self.cosine * cosine + self.sine * sine
+    }
+}

@@ -1,0 +1,223 @@
+//! The score (Lagrange multiplier) test: what a candidate would explain, without fitting it.
+
+use crate::effects::{Candidate, Effect, Situation};
+use crate::identify::free_run::Signals;
+use crate::identify::linearization::{Linearization, Weighting};
+use crate::identify::point::{Freedom, Point};
+use crate::identify::stream::Stream;
+use crate::identify::uncertainty::descending_eigen;
+use crate::{Error, Matrix, Record};
+use nalgebra::DVector;
+
+/// A candidate's score.
+#[derive(Clone, Debug)]
+pub(crate) struct Score {
+    /// The block with the values that the score test gives it.
+    pub start: Effect,
+    /// The part of the residual's sum of squares that it would take, 0 to 1.
+    pub gain: f64,
+    /// Columns that the base model does not absorb.
+    pub columns: usize,
+}
+
+/// Tests candidates against a base point: every probe's column, projected off the base model's own
+/// sensitivities, takes a part of what is left of the residual.
+pub(crate) fn scores(
+    base: &Base,
+    candidates: &[Candidate],
+    check: &mut dyn FnMut(f64) -> Result<(), Error>,
+) -> Result<Vec<Score>, Error> {
+    /// Candidates whose columns are held at once.
+    const AT_ONCE: usize = 24;
+    let mut scores = Vec::new();
+    let groups = candidates.chunks(AT_ONCE);
+    let count = groups.len().max(1) as f64;
+    for (number, group) in groups.enumerate() {
+        check(number as f64 / count)?;
+        scores.extend(base.score(group)?);
+    }
+    Ok(scores)
+}
+
+/// A fitted point with its signals and its sensitivities' Gram matrix, ready to test candidates.
+pub(crate) struct Base<'a> {
+    pub point: &'a Point,
+    pub record: &'a Record,
+    pub freedom: Freedom,
+    pub weighting: &'a Weighting,
+    pub signals: Vec<Signals>,
+    pub residuals: Vec<Matrix>,
+    /// Scaled eigenvectors of the Gram matrix of what is free, over the roots of their eigenvalues:
+    /// `W W^T` is its inverse.
+    whitening: Matrix,
+    linearization: Linearization,
+}
+
+impl<'a> Base<'a> {
+    pub(crate) fn new(
+        point: &'a Point,
+        record: &'a Record,
+        freedom: Freedom,
+        weighting: &'a Weighting,
+    ) -> Result<Self, Error> {
+        /// Directions with less power than this cannot be told from rounding.
+        const RANK: f64 = 1e-11;
+        let linearization =
+            Linearization::new(point, record, freedom, weighting, &mut || Ok(()))?;
+        let layout = &linearization.layout;
+        let bounds = point.bounds(layout, record, freedom);
+        let free: Vec<usize> =
+            (0..layout.len).filter(|&i| bounds.lower[i] < 0.0 && bounds.upper[i] > 0.0).collect();
+        let gram = &linearization.equations.gram;
+        let scale: Vec<f64> =
+            free.iter().map(|&i| gram[(i, i)].sqrt().max(f64::MIN_POSITIVE)).collect();
+        let scaled = Matrix::from_fn(free.len(), free.len(), |i, j| {
+            gram[(free[i], free[j])] / (scale[i] * scale[j])
+        });
+        let (values, vectors) = descending_eigen(scaled);
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let rank = values.iter().take_while(|&&value| value > RANK * largest).count();
+        let mut whitening = Matrix::zeros(layout.len, rank);
+        for (i, &row) in free.iter().enumerate() {
+            for column in 0..rank {
+                whitening[(row, column)] = vectors[(i, column)] / (scale[i] * values[column].sqrt());
+            }
+        }
+        let runs = record.experiments().iter().enumerate();
+        let signals: Result<Vec<Signals>, Error> =
+            runs.map(|(index, experiment)| point.signals(experiment, index)).collect();
+        Ok(Self {
+            signals: signals?,
+            residuals: point.residuals(record)?,
+            point,
+            record,
+            freedom,
+            weighting,
+            whitening,
+            linearization,
+        })
+    }
+
+    /// Calls `ask` with what candidates are placed by.
+    pub(crate) fn situation<T>(&self, ask: impl FnOnce(&Situation) -> T) -> T {
+        let select = |choose: fn(&Signals) -> &Matrix| -> Vec<Matrix> {
+            self.signals.iter().map(|signals| choose(signals).clone()).collect()
+        };
+        let widest = self.point.channels.iter().map(|channel| {
+            let used = channel.half_widths.iter().zip(&channel.weights).filter(|(_, p)| **p > 0.0);
+            used.map(|(r, _)| *r).fold(0.0, f64::max)
+        });
+        ask(&Situation {
+            record: self.record,
+            drives: &select(|signals| &signals.drive),
+            displacements: &select(|signals| &signals.displacement),
+            residuals: &self.residuals,
+            order: self.point.dynamics.own().order(),
+            widest: widest.collect(),
+        })
+    }
+
+    /// Scores of a few candidates.
+    fn score(&self, candidates: &[Candidate]) -> Result<Vec<Score>, Error> {
+        /// A column of which less is left is the base model's own.
+        const LEFT: f64 = 1e-7;
+        let probes: Vec<(Point, &Effect)> = candidates
+            .iter()
+            .flat_map(|candidate| &candidate.probes)
+            .map(|probe| (self.point.with_effect(probe.clone()), probe))
+            .collect();
+        let (n, unknowns) = (probes.len(), self.linearization.layout.len);
+        let mut cross = Matrix::zeros(unknowns, n);
+        let mut squares = Matrix::zeros(n, n);
+        let mut with_residual = DVector::zeros(n);
+        for (index, experiment) in self.record.experiments().iter().enumerate() {
+            let known = &self.signals[index];
+            let base = self.point.output_from(
+                crate::effects::Stage::Added,
+                known,
+                experiment,
+                index,
+            )?;
+            let columns: Result<Vec<Matrix>, Error> = probes
+                .iter()
+                .map(|(point, probe)| {
+                    let stage = probe.block().stage();
+                    Ok(point.output_from(stage, known, experiment, index)? - &base)
+                })
+                .collect();
+            let columns = columns?;
+            let places: Vec<usize> = experiment.scored_runs().flatten().collect();
+            let mut first = 0;
+            let derivatives = self.freedom.derivatives;
+            let layout = &self.linearization.layout;
+            let mut stream = Stream::new(self.point, layout, derivatives, experiment, index)?;
+            stream.run(&mut |rows| {
+                let count = rows.residuals.ncols();
+                let places = &places[first..first + count];
+                for (output, regressor) in rows.regressors.iter().enumerate() {
+                    let own = Matrix::from_fn(count, n, |row, column| {
+                        columns[column][(places[row], output)]
+                    });
+                    let residual = rows.residuals.row(output).transpose();
+                    let weights = residual.map(|value| self.weighting.of(output, value).0);
+                    let mut weighted = own.clone();
+                    for (mut row, weight) in weighted.row_iter_mut().zip(weights.iter()) {
+                        row *= *weight;
+                    }
+                    cross.gemm(1.0, regressor, &weighted, 1.0);
+                    squares.gemm_tr(1.0, &own, &weighted, 1.0);
+                    with_residual.gemv_tr(1.0, &weighted, &residual, 1.0);
+                }
+                first += count;
+                Ok(())
+            })?;
+        }
+        // projected off the base model's sensitivities
+        let white = self.whitening.transpose() * cross;
+        let own = self.whitening.transpose() * self.linearization.descent();
+        let left = &squares - white.transpose() * &white;
+        let score = with_residual - white.transpose() * &own;
+        let cost = self.linearization.cost - own.norm_squared();
+        let mut found = Vec::new();
+        let mut first = 0;
+        for candidate in candidates {
+            let places: Vec<usize> = (first..first + candidate.probes.len())
+                .filter(|&i| left[(i, i)] > LEFT * squares[(i, i)])
+                .collect();
+            let own = Matrix::from_fn(places.len(), places.len(), |i, j| {
+                left[(places[i], places[j])]
+            });
+            let rhs = DVector::from_fn(places.len(), |i, _| score[places[i]]);
+            let solution = solve_scaled(own, &rhs);
+            let gain = solution.dot(&rhs) / cost.max(f64::MIN_POSITIVE);
+            let mut coefficients = vec![0.0; candidate.probes.len()];
+            for (value, &place) in solution.iter().zip(&places) {
+                coefficients[place - first] = *value;
+            }
+            let columns = places.len();
+            let start = candidate.start(&coefficients);
+            found.push(Score { start, gain: gain.clamp(0.0, 1.0), columns });
+            first += candidate.probes.len();
+        }
+        Ok(found)
+    }
+}
+
+/// The least squares solution of symmetric equations, directions without power left out.
+fn solve_scaled(matrix: Matrix, rhs: &DVector<f64>) -> DVector<f64> {
+    const RANK: f64 = 1e-9;
+    let n = matrix.nrows();
+    if n == 0 {
+        return DVector::zeros(0);
+    }
+    let scale = matrix.diagonal().map(|value| value.sqrt().max(f64::MIN_POSITIVE));
+    let scaled = Matrix::from_fn(n, n, |i, j| matrix[(i, j)] / (scale[i] * scale[j]));
+    let (values, vectors) = descending_eigen(scaled);
+    let mut solution = DVector::zeros(n);
+    let rhs = rhs.component_div(&scale);
+    for (place, &value) in values.iter().enumerate().take_while(|(_, v)| **v > RANK) {
+        let vector = vectors.column(place);
+        solution += vector * (vector.dot(&rhs) / value);
+    }
+    solution.component_div(&scale)
+}

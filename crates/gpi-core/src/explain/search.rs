@@ -1,0 +1,354 @@
+//! The closed loop: score candidates, fit the best few jointly, keep what the held-out data confirm.
+
+use super::score::{Base, Score, scores};
+use crate::effects::{CATALOGUE, Entry};
+use crate::identify::levenberg_marquardt::{FitOptions, Fitted, fit};
+use crate::identify::outliers;
+use crate::identify::point::Point;
+use crate::identify::preparation::{Prepared, rescale};
+use crate::identify::refine::{RefineOptions, Refined, settings};
+use crate::identify::{Progress, report};
+use crate::{Error, Matrix, Record};
+
+/// What a fit with one more effect brought.
+#[derive(Clone)]
+pub(crate) struct Trial {
+    pub entry: &'static Entry,
+    pub point: Point,
+    pub cost: f64,
+    /// `N ln(cost before / cost after)`.
+    pub deviance: f64,
+    /// What chance alone would give at most, with the colour of the residual that is left.
+    pub chance: f64,
+    /// Sum of squares of what is held out, block by block.
+    pub held_out: Vec<f64>,
+    /// The part of the residual that the score test promised.
+    pub promised: f64,
+}
+
+/// An effect that was tried and not taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rejected {
+    /// The effect.
+    pub effect: &'static str,
+    /// Root mean square error with it on the held-out blocks.
+    pub holdout_rms: f64,
+    /// Why it was not taken.
+    pub why: String,
+    /// Effects that explain the same.
+    pub confounded_with: Vec<&'static str>,
+}
+
+/// A round of the search.
+#[derive(Clone)]
+pub(crate) struct Round {
+    pub trial: Trial,
+    pub others: Vec<Rejected>,
+    /// Effects that an earlier round had taken and that this one made superfluous.
+    pub dropped: Vec<&'static str>,
+}
+
+pub(crate) struct Search<'a> {
+    pub prepared: Prepared<'a>,
+    /// Where what the training holds out is scored.
+    pub test: Record,
+    pub options: FitOptions,
+    pub allowed: Vec<&'static Entry>,
+    /// Whether a mode that G lacks is an effect; else it is an order that G was not given.
+    pub order_is_given: bool,
+    /// Which grids may move.
+    pub moving: RefineOptions,
+    pub point: Point,
+    pub cost: f64,
+    pub rounds: Vec<Round>,
+    /// What was tried in the last round and not taken.
+    pub last: Vec<Rejected>,
+}
+
+impl<'a> Search<'a> {
+    /// Goes on from a refined base model.
+    pub(crate) fn new(
+        prepared: Prepared<'a>,
+        refined: &Refined,
+        allowed: Vec<&'static Entry>,
+        order_is_given: bool,
+    ) -> Result<Self, Error> {
+        /// Levenberg-Marquardt steps of a trial.
+        const STEPS: usize = 12;
+        let mut options = settings(&prepared, &RefineOptions::default(), STEPS);
+        options.weighting.outputs.clone_from(&refined.options.weighting.outputs);
+        options.gain = 1e-5;
+        Ok(Self {
+            test: super::blocks::complement(&prepared.record)?,
+            prepared,
+            options,
+            allowed,
+            order_is_given,
+            moving: RefineOptions::default(),
+            point: refined.fitted.point.clone(),
+            cost: refined.fitted.linearization.cost,
+            rounds: Vec::new(),
+            last: Vec::new(),
+        })
+    }
+
+    /// Adds effects until nothing more is confirmed.
+    pub(crate) fn run(&mut self, progress: Progress) -> Result<(), Error> {
+        const ROUNDS: usize = 12;
+        for _ in 0..ROUNDS {
+            let known = self.rounds.len();
+            self.round(progress)?;
+            if self.rounds.len() == known {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// One round: takes the best effect, if any is confirmed.
+    fn round(&mut self, progress: Progress) -> Result<(), Error> {
+        /// Families that are fitted; the score test's best are rarely wrong.
+        const FITTED: usize = 4;
+        let ranked = self.ranked(progress)?;
+        let before = self.held_out(&self.point)?;
+        let mut trials = Vec::new();
+        for (entry, score) in ranked.into_iter().take(FITTED) {
+            report(progress, entry.name, 0.0)?;
+            trials.push(self.trial(entry, score, progress)?);
+        }
+        trials.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let taken = trials.iter().position(|trial| {
+            trial.deviance > trial.chance && is_confirmed(&before, &trial.held_out)
+        });
+        let Some(taken) = taken else {
+            self.last = trials.iter().map(|trial| self.reject(trial, None)).collect();
+            return Ok(());
+        };
+        let taken = trials.remove(taken);
+        let others = trials.iter().map(|trial| self.reject(trial, Some(&taken))).collect();
+        self.point = taken.point.clone();
+        self.cost = taken.cost;
+        if taken.entry.name == "linear-dynamics" && !self.order_is_given {
+            self.absorb_modes();
+        }
+        self.rounds.push(Round { trial: taken, others, dropped: Vec::new() });
+        self.repair()?;
+        self.place_grids(progress)?;
+        self.backward(progress)?;
+        Ok(())
+    }
+
+    /// Moves half-widths and thresholds, which were placed before the latest effect was known: what a
+    /// badly placed grid leaves looks like another effect.
+    fn place_grids(&mut self, progress: Progress) -> Result<(), Error> {
+        const STEPS: usize = 15;
+        let free = RefineOptions { thresholds: true, half_widths: true, ..self.moving };
+        let mut options = settings(&self.prepared, &free, STEPS);
+        options.weighting = self.options.weighting.clone();
+        options.gain = 1e-4;
+        let record = &self.prepared.record;
+        let fitted = fit(self.point.clone(), record, &options, "refinement", progress)?;
+        (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
+        Ok(())
+    }
+
+    /// The best candidate of each family, the most promising first.
+    fn ranked(&self, progress: Progress) -> Result<Vec<(&'static Entry, Score)>, Error> {
+        let weighting = &self.options.weighting;
+        let base = Base::new(&self.point, &self.prepared.record, self.options.freedom, weighting)?;
+        let values = self.prepared.values();
+        let mut best: Vec<(&'static Entry, Score, f64)> = Vec::new();
+        for &entry in &self.allowed {
+            let candidates = base.situation(entry.candidates);
+            let mut check = |done| report(progress, entry.name, done);
+            for score in scores(&base, &candidates, &mut check)? {
+                let deviance = -values * (1.0 - score.gain).max(1e-300).ln();
+                let worth = deviance - score.columns as f64 * values.ln();
+                match best.iter_mut().find(|(known, _, _)| known.name == entry.name) {
+                    Some(known) if known.2 < worth => *known = (entry, score, worth),
+                    Some(_) => {}
+                    None => best.push((entry, score, worth)),
+                }
+            }
+        }
+        best.sort_by(|a, b| b.2.total_cmp(&a.2));
+        /// A family that promises less than this part of the best one's need not be fitted.
+        const FAR_BEHIND: f64 = 0.2;
+        let most = best.first().map_or(0.0, |first| first.2);
+        best.retain(|(_, _, worth)| *worth > 0.0 && *worth > FAR_BEHIND * most);
+        Ok(best.into_iter().map(|(entry, score, _)| (entry, score)).collect())
+    }
+
+    /// Fits the whole model with one more effect.
+    fn trial(
+        &self,
+        entry: &'static Entry,
+        score: Score,
+        progress: Progress,
+    ) -> Result<Trial, Error> {
+        let start = self.point.with_effect(score.start);
+        let record = &self.prepared.record;
+        let fitted = fit(start, record, &self.options, entry.name, progress)?;
+        self.judged(entry, fitted, score.gain, progress)
+    }
+
+    fn judged(
+        &self,
+        entry: &'static Entry,
+        fitted: Fitted,
+        promised: f64,
+        progress: Progress,
+    ) -> Result<Trial, Error> {
+        let (cost, values) = (fitted.linearization.cost, self.prepared.values());
+        let point = fitted.point.clone();
+        let added = fitted.linearization.layout.len.saturating_sub(self.layout_len());
+        let refined = Refined { fitted, options: self.options.clone(), outliers: 0, robust: false };
+        let uncertainty = refined.uncertainty(&self.prepared, progress)?;
+        let colour = (uncertainty.used / uncertainty.estimated.max(1) as f64).max(1.0);
+        /// Candidates that a round looks at: the best of so many must be better than one.
+        const LOOKS: f64 = 150.0;
+        let chance = colour * (added.max(1) as f64 * values.ln() + 2.0 * LOOKS.ln());
+        let deviance = values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln();
+        let held_out = self.held_out(&point)?;
+        Ok(Trial { entry, point, cost, deviance, chance, held_out, promised })
+    }
+
+    fn layout_len(&self) -> usize {
+        crate::identify::point::Layout::new(&self.point, self.options.freedom).len
+    }
+
+    /// Sum of squares of every held-out block.
+    fn held_out(&self, point: &Point) -> Result<Vec<f64>, Error> {
+        let residuals = point.residuals(&self.test)?;
+        let weights = &self.options.weighting.outputs;
+        let mut sums = Vec::new();
+        for (residual, experiment) in residuals.iter().zip(self.test.experiments()) {
+            for run in experiment.scored_rows(residual) {
+                let columns = run.column_iter().zip(weights);
+                sums.push(columns.map(|(c, w)| w * w * c.norm_squared()).sum());
+            }
+        }
+        Ok(sums)
+    }
+
+    pub(crate) fn holdout_rms(&self, held_out: &[f64]) -> f64 {
+        let values = self.test.scored() * self.test.outputs().len();
+        (held_out.iter().sum::<f64>() / values.max(1) as f64).sqrt()
+    }
+
+    fn reject(&self, trial: &Trial, taken: Option<&Trial>) -> Rejected {
+        let holdout_rms = self.holdout_rms(&trial.held_out);
+        let (mut why, mut confounded_with) = (String::new(), Vec::new());
+        match taken {
+            Some(taken) if trial.deviance > taken.deviance - taken.chance => {
+                why = format!("explains as much as {}", taken.entry.name);
+                confounded_with.push(taken.entry.name);
+            }
+            Some(taken) => why = format!("{} explains more", taken.entry.name),
+            None if trial.deviance <= trial.chance => {
+                why.push_str("gains no more than chance would");
+            }
+            None => why.push_str("is not confirmed by the held-out blocks"),
+        }
+        Rejected { effect: trial.entry.name, holdout_rms, why, confounded_with }
+    }
+
+    /// Drops effects that a later one has made superfluous.
+    fn backward(&mut self, progress: Progress) -> Result<(), Error> {
+        let mut place = 0;
+        while self.point.effects.len() > 1 && place < self.point.effects.len() {
+            let entry = self.point.effects[place].entry();
+            let newest = self.rounds.last().map(|round| round.trial.entry.name);
+            if Some(entry.name) == newest {
+                place += 1;
+                continue;
+            }
+            let without = self.point.without_effect(place);
+            let record = &self.prepared.record;
+            let fitted = fit(without, record, &self.options, "backward step", progress)?;
+            let lost = self.prepared.values() * (fitted.linearization.cost / self.cost).ln();
+            let chance = self.rounds.last().map_or(0.0, |round| round.trial.chance);
+            if lost < chance {
+                (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
+                if let Some(round) = self.rounds.last_mut() {
+                    round.dropped.push(entry.name);
+                }
+            } else {
+                place += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes modes that were found parts of G.
+    fn absorb_modes(&mut self) {
+        while let Some(place) =
+            self.point.effects.iter().position(|effect| effect.name() == "linear-dynamics")
+        {
+            for section in &mut self.point.dynamics.sections {
+                section.beside = match section.beside {
+                    Some(own) if own == place => None,
+                    Some(own) if own > place => Some(own - 1),
+                    other => other,
+                };
+            }
+            self.point.effects.remove(place);
+        }
+        rescale(&mut self.point);
+    }
+
+    /// Replaces isolated outliers of the residual by what their neighbours say.
+    pub(crate) fn repair(&mut self) -> Result<(), Error> {
+        let residuals = self.point.residuals(&self.prepared.record)?;
+        let places = outliers::places(&residuals, &self.prepared.record);
+        if places.iter().flatten().all(Vec::is_empty) {
+            return Ok(());
+        }
+        self.prepared.record = repaired(&self.prepared.record, &residuals, &places)?;
+        Ok(())
+    }
+}
+
+/// Whether what is held out has become smaller by more than chance: most blocks, and their sum.
+fn is_confirmed(before: &[f64], after: &[f64]) -> bool {
+    /// The least part by which the sum must fall.
+    const LEAST: f64 = 2e-3;
+    /// Standard errors of the mean difference.
+    const ERRORS: f64 = 1.7;
+    let differences: Vec<f64> = before.iter().zip(after).map(|(a, b)| a - b).collect();
+    let n = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / n;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    let total: f64 = before.iter().sum();
+    mean * n > LEAST * total && mean > ERRORS * (variance / n).sqrt()
+}
+
+/// The record with samples at `places` set to what makes their residual that of their neighbours.
+pub(crate) fn repaired(
+    record: &Record,
+    residuals: &[Matrix],
+    places: &[Vec<Vec<usize>>],
+) -> Result<Record, Error> {
+    let mut experiments = record.experiments().to_vec();
+    for ((experiment, residual), places) in experiments.iter_mut().zip(residuals).zip(places) {
+        for (output, places) in places.iter().enumerate() {
+            for &k in places {
+                let beside = 0.5 * (residual[(k - 1, output)] + residual[(k + 1, output)]);
+                experiment.output[(k, output)] += beside - residual[(k, output)];
+            }
+        }
+    }
+    record.with_experiments(experiments)
+}
+
+/// The entries that `names` allow, all when there are none.
+pub(crate) fn allowed(names: Option<&[String]>) -> Result<Vec<&'static Entry>, Error> {
+    let Some(names) = names else { return Ok(CATALOGUE.iter().collect()) };
+    let find = |name: &String| {
+        CATALOGUE.iter().find(|entry| entry.name == name).ok_or_else(|| {
+            let known: Vec<&str> = CATALOGUE.iter().map(|entry| entry.name).collect();
+            Error::parameter("effects", name, format!("one of {}", known.join(", ")))
+        })
+    };
+    names.iter().map(find).collect()
+}
