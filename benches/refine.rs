@@ -67,7 +67,13 @@ fn record() -> Record {
     for (k, value) in output.iter_mut().enumerate() {
         *value += 0.05 * (k as f64 * (1.0 + k as f64 * 1e-3)).sin();
     }
-    let run = Experiment { input, output, covariates: Matrix::zeros(SAMPLES, 0), warmup: 0, held_out: vec![] };
+    let run = Experiment {
+        input,
+        output,
+        covariates: Matrix::zeros(SAMPLES, 0),
+        warmup: 0,
+        held_out: vec![],
+    };
     let channel = |name: &str| vec![Channel::new(name, "")];
     Record::new(vec![run], 4000.0, channel("u"), channel("y"), vec![]).expect("the record is valid")
 }

@@ -42,10 +42,16 @@ fn explain<'py>(
         .iter()
         .map(|b| {
             let quantities = b.block().quantities(units);
-            (b.name(), quantities.into_iter().map(|q| (q.name, q.value, q.unit)).collect::<Vec<_>>())
+            (
+                b.name(),
+                quantities.into_iter().map(|q| (q.name, q.value, q.unit)).collect::<Vec<_>>(),
+            )
         })
         .collect();
     result.set_item("blocks", blocks)?;
+    let tests: Vec<_> =
+        found.tests.iter().map(|t| (t.name, t.statistic, t.threshold, t.p_value)).collect();
+    result.set_item("tests", tests)?;
     result.set_item("model", found.model.to_json().unwrap_or_default())?;
     Ok(result)
 }

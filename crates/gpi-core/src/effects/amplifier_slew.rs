@@ -16,6 +16,7 @@ impl AmplifierSlew {
     pub(super) const WHAT: &'static str = "the drive cannot change faster than a limit";
     pub(super) const STAGE: Stage = Stage::Input;
     pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = false;
 
     /// Limits that so many of the record's steps stay below: an amplifier that is slower than most of
     /// them would be seen at once.

@@ -17,6 +17,7 @@ impl Backlash {
     pub(super) const WHAT: &'static str = "mechanical play after the dynamics";
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = false;
 
     /// Half-widths from a ten-thousandth of the span to a fifth.
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {

@@ -20,6 +20,7 @@ impl ColouredNoise {
     pub(super) const WHAT: &'static str = "the noise has memory";
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
+    pub(super) const REPEATS: bool = false;
 
     /// None: it is what remains when nothing else explains the residual.
     pub(super) fn candidates(_: &Situation) -> Vec<Candidate> {

@@ -26,6 +26,7 @@ impl Covariate {
         "another measured column leaks in, possibly through a lag";
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = true;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let shortest = 1.0 / situation.record.rate();

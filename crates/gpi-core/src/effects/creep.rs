@@ -26,6 +26,7 @@ impl Creep {
     pub(super) const WHAT: &'static str = "slow relaxation driven by the actuator's own motion";
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = true;
 
     /// One, two and three lags between 0.05 s and the record's length.
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {

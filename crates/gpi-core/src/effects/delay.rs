@@ -19,6 +19,7 @@ impl Delay {
     pub(super) const WHAT: &'static str = "dead time beyond the linear model's";
     pub(super) const STAGE: Stage = Stage::Input;
     pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let delays =

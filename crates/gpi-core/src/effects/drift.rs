@@ -21,6 +21,7 @@ impl Drift {
     pub(super) const WHAT: &'static str = "slow change that the input does not drive";
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = false;
+    pub(super) const REPEATS: bool = true;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let duration = situation.duration();

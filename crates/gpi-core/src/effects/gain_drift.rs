@@ -19,6 +19,7 @@ impl GainDrift {
     pub(super) const WHAT: &'static str = "sensitivity changes slowly with time";
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = false;
+    pub(super) const REPEATS: bool = true;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let duration = situation.duration();

@@ -29,6 +29,7 @@ impl HysteresisShape {
         "minor loops are not congruent: outside the Prandtl-Ishlinskii class";
     pub(super) const STAGE: Stage = Stage::Plays;
     pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let block = |input: usize| {

@@ -23,6 +23,7 @@ impl LinearDynamics {
     pub(super) const WHAT: &'static str = "a mode or an order that the linear part lacks";
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = true;
 
     /// Lightly damped modes from a few periods a record to close to half the rate.
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {

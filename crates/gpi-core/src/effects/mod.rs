@@ -76,6 +76,7 @@ macro_rules! catalogue {
             what: $effect::WHAT,
             stage: $effect::STAGE,
             driven: $effect::DRIVEN,
+            repeats: $effect::REPEATS,
             candidates: $effect::candidates,
         }),*];
     };
@@ -111,6 +112,8 @@ pub struct Entry {
     /// Whether the input (or another measured column) drives it, so that it is the same in another
     /// experiment; drift and disturbances are not.
     pub driven: bool,
+    /// Whether a model may have it more than once: two lines, two columns, a finer function of time.
+    pub repeats: bool,
     /// The blocks that the search tries before a base model.
     pub(crate) candidates: fn(&Situation) -> Vec<Candidate>,
 }

@@ -19,6 +19,7 @@ impl Outliers {
     pub(super) const WHAT: &'static str = "isolated wrong samples";
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
+    pub(super) const REPEATS: bool = false;
 
     /// None: they are counted in the residual.
     pub(super) fn candidates(_: &Situation) -> Vec<Candidate> {

@@ -20,6 +20,7 @@ impl OutputNonlinearity {
     pub(super) const WHAT: &'static str = "a static curve after the dynamics: the sensor's";
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let block = |output, terms: usize| {

@@ -27,6 +27,7 @@ impl PeriodicDisturbance {
         "a line at a fixed frequency that the input does not drive";
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = false;
+    pub(super) const REPEATS: bool = true;
 
     /// The line of the residual's spectrum that stands out most from its neighbours.
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {

@@ -24,6 +24,7 @@ impl RateDependence {
     pub(super) const WHAT: &'static str = "half-widths grow with the rate of the input";
     pub(super) const STAGE: Stage = Stage::Plays;
     pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let rate = situation.record.rate();

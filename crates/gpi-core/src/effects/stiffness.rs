@@ -22,6 +22,7 @@ impl Stiffness {
         "the resonance moves with amplitude: nonlinearity inside the mechanical loop";
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let order = situation.order;

@@ -1,6 +1,8 @@
 //! Closing the loop: residual, missing effect, before and after.
 
 mod blocks;
+mod noise;
+mod residual;
 mod score;
 mod search;
 
@@ -8,9 +10,11 @@ use crate::effects::Effect;
 use crate::identify::chain::{compare, prepare};
 use crate::identify::levenberg_marquardt::fit;
 use crate::identify::point::Point;
+use crate::identify::preparation::starts_at_rest;
 use crate::identify::refine::{RefineOptions, settings};
 use crate::identify::{Grid, IdentifyOptions, NoiseFloor, Progress};
 use crate::{Error, Matrix, Model, Record, SimulationError};
+pub use residual::ResidualTest;
 pub use search::Rejected;
 use search::Search;
 
@@ -54,6 +58,19 @@ pub struct Explanation {
     pub noise_floor: NoiseFloor,
     pub residuals: Vec<Matrix>,
     pub blocks: Vec<Effect>,
+    pub tests: Vec<ResidualTest>,
+}
+
+/// The prepared record with its outputs as they were measured, wrong samples included.
+fn as_measured(prepared: &Record, given: &Record, means: &[f64]) -> Result<Record, Error> {
+    let mut experiments = prepared.experiments().to_vec();
+    for (experiment, given) in experiments.iter_mut().zip(given.experiments()) {
+        experiment.output.copy_from(&given.output);
+        for (mut column, mean) in experiment.output.column_iter_mut().zip(means) {
+            column.add_scalar_mut(-mean);
+        }
+    }
+    prepared.with_experiments(experiments)
 }
 
 /// Explains a record.
@@ -64,30 +81,35 @@ pub fn explain(
 ) -> Result<Explanation, Error> {
     let allowed = search::allowed(options.effects.as_deref())?;
     let (training, _) = blocks::hold_out(record)?;
+    // Where the past is unknown, many plays are needed to find it.
+    let in_motion = |e: &crate::Experiment| e.warmup == 0 && !starts_at_rest(e);
+    let plays = if training.experiments().iter().any(in_motion) { 24 } else { 16 };
     let identify = IdentifyOptions {
-        half_widths: Some(options.identify.half_widths.clone().unwrap_or(Grid::Count(16))),
+        half_widths: Some(options.identify.half_widths.clone().unwrap_or(Grid::Count(plays))),
         thresholds: Some(options.identify.thresholds.clone().unwrap_or(Grid::Count(7))),
         robust: Some(false),
         ..options.identify.clone()
     };
     // Spikes that stand out of the output itself.
     let outputs: Vec<Matrix> = training.experiments().iter().map(|e| e.output.clone()).collect();
-    let spikes = crate::identify::outliers::places(&outputs, &training);
+    let spikes = crate::identify::outliers::places(&outputs, &search::everything(&training)?);
     let training = search::repaired(&training, &outputs, &spikes)?;
     let mut prepared = prepare(&training, &identify)?;
+    let given = as_measured(&prepared.record, record, &prepared.means)?;
     let mut refined = compare(&mut prepared, &identify, true, progress)?.refined;
     refined.drop_undetermined(&prepared, progress)?;
-    let given = prepared.record.clone();
     let means = prepared.means.clone();
     let base = refined.fitted.point.clone();
-    let mut search = Search::new(prepared, &refined, allowed, options.identify.order.is_some())?;
+    let mut search =
+        Search::new(prepared, &refined, allowed, options.identify.order.is_some(), spikes)?;
     search.repair()?;
-    let error = |search: &Search, point: &Point| -> Result<_, Error> {
-        let train = SimulationError::of(&given, &point.residuals(&given)?, false);
-        let test = SimulationError::of(&search.test, &point.residuals(&search.test)?, false);
-        Ok((train, test))
+    // with its outliers, and without
+    let error = |search: &Search, point: &Point, record: &Record| -> Result<_, Error> {
+        let residuals = point.residuals(record)?;
+        let train = SimulationError::of(record, &residuals, false);
+        Ok((train, SimulationError::of(&search.test, &residuals, false)))
     };
-    let before = error(&search, &base)?;
+    let before = error(&search, &base, &given)?;
     search.run(progress)?;
     // The grids were placed before the effects were known.
     let polish = RefineOptions { thresholds: true, half_widths: true, ..RefineOptions::default() };
@@ -96,7 +118,7 @@ pub fn explain(
     let fitted =
         fit(search.point.clone(), &search.prepared.record, &options, "refinement", progress)?;
     search.point = fitted.point;
-    let after = error(&search, &search.point)?;
+    let after = error(&search, &search.point, &search.prepared.record)?;
     let mut steps = vec![Step {
         effect: None,
         deviance: 0.0,
@@ -123,7 +145,24 @@ pub fn explain(
             effects.push(step);
         }
     }
-    let residuals = search.point.residuals(&given)?;
+    let residuals = search.point.residuals(&search.prepared.record)?;
+    let simulated: Vec<Matrix> = residuals
+        .iter()
+        .zip(search.prepared.record.experiments())
+        .map(|(residual, experiment)| &experiment.output - residual)
+        .collect();
+    let beside = residual::Beside {
+        record: &search.prepared.record,
+        residuals: &residuals,
+        simulated: &simulated,
+    };
+    let tests = residual::analyse(&beside)?;
+    let noise = noise::effects(&search, &residuals, &tests, &given)?;
+    let allowed = |effect: &&Effect| search.allowed.iter().any(|e| e.name == effect.name());
+    let noise: Vec<Effect> = noise.iter().filter(allowed).cloned().collect();
+    effects.extend(noise.iter().map(Effect::name));
+    let mut blocks = search.point.blocks();
+    blocks.extend(noise);
     Ok(Explanation {
         base: base.to_model(record, &search.prepared.record, &means)?,
         model: search.point.to_model(record, &search.prepared.record, &means)?,
@@ -134,6 +173,7 @@ pub fn explain(
         after,
         noise_floor: NoiseFloor::estimate(&search.prepared.record, &residuals),
         residuals,
-        blocks: search.point.blocks(),
+        blocks,
+        tests,
     })
 }

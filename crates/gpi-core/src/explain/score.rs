@@ -62,8 +62,7 @@ impl<'a> Base<'a> {
     ) -> Result<Self, Error> {
         /// Directions with less power than this cannot be told from rounding.
         const RANK: f64 = 1e-11;
-        let linearization =
-            Linearization::new(point, record, freedom, weighting, &mut || Ok(()))?;
+        let linearization = Linearization::new(point, record, freedom, weighting, &mut || Ok(()))?;
         let layout = &linearization.layout;
         let bounds = point.bounds(layout, record, freedom);
         let free: Vec<usize> =
@@ -80,7 +79,8 @@ impl<'a> Base<'a> {
         let mut whitening = Matrix::zeros(layout.len, rank);
         for (i, &row) in free.iter().enumerate() {
             for column in 0..rank {
-                whitening[(row, column)] = vectors[(i, column)] / (scale[i] * values[column].sqrt());
+                whitening[(row, column)] =
+                    vectors[(i, column)] / (scale[i] * values[column].sqrt());
             }
         }
         let runs = record.experiments().iter().enumerate();
@@ -132,12 +132,8 @@ impl<'a> Base<'a> {
         let mut with_residual = DVector::zeros(n);
         for (index, experiment) in self.record.experiments().iter().enumerate() {
             let known = &self.signals[index];
-            let base = self.point.output_from(
-                crate::effects::Stage::Added,
-                known,
-                experiment,
-                index,
-            )?;
+            let base =
+                self.point.output_from(crate::effects::Stage::Added, known, experiment, index)?;
             let columns: Result<Vec<Matrix>, Error> = probes
                 .iter()
                 .map(|(point, probe)| {
@@ -184,9 +180,8 @@ impl<'a> Base<'a> {
             let places: Vec<usize> = (first..first + candidate.probes.len())
                 .filter(|&i| left[(i, i)] > LEFT * squares[(i, i)])
                 .collect();
-            let own = Matrix::from_fn(places.len(), places.len(), |i, j| {
-                left[(places[i], places[j])]
-            });
+            let own =
+                Matrix::from_fn(places.len(), places.len(), |i, j| left[(places[i], places[j])]);
             let rhs = DVector::from_fn(places.len(), |i, _| score[places[i]]);
             let solution = solve_scaled(own, &rhs);
             let gain = solution.dot(&rhs) / cost.max(f64::MIN_POSITIVE);

@@ -61,6 +61,8 @@ pub(crate) struct Search<'a> {
     pub point: Point,
     pub cost: f64,
     pub rounds: Vec<Round>,
+    /// Isolated wrong samples, `[experiment][output]`.
+    pub wrong: Vec<Vec<Vec<usize>>>,
     /// What was tried in the last round and not taken.
     pub last: Vec<Rejected>,
 }
@@ -72,6 +74,7 @@ impl<'a> Search<'a> {
         refined: &Refined,
         allowed: Vec<&'static Entry>,
         order_is_given: bool,
+        spikes: Vec<Vec<Vec<usize>>>,
     ) -> Result<Self, Error> {
         /// Levenberg-Marquardt steps of a trial.
         const STEPS: usize = 12;
@@ -88,6 +91,7 @@ impl<'a> Search<'a> {
             point: refined.fitted.point.clone(),
             cost: refined.fitted.linearization.cost,
             rounds: Vec::new(),
+            wrong: spikes,
             last: Vec::new(),
         })
     }
@@ -116,7 +120,8 @@ impl<'a> Search<'a> {
             report(progress, entry.name, 0.0)?;
             trials.push(self.trial(entry, score, progress)?);
         }
-        trials.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        // what is explained, less what so many parameters would by chance
+        trials.sort_by(|a, b| (b.deviance - b.chance).total_cmp(&(a.deviance - a.chance)));
         let taken = trials.iter().position(|trial| {
             trial.deviance > trial.chance && is_confirmed(&before, &trial.held_out)
         });
@@ -142,12 +147,22 @@ impl<'a> Search<'a> {
     /// badly placed grid leaves looks like another effect.
     fn place_grids(&mut self, progress: Progress) -> Result<(), Error> {
         const STEPS: usize = 15;
+        /// Plays and deadzones of an input that are tried.
+        const GRID: (usize, usize) = (20, 9);
         let free = RefineOptions { thresholds: true, half_widths: true, ..self.moving };
         let mut options = settings(&self.prepared, &free, STEPS);
         options.weighting = self.options.weighting.clone();
         options.gain = 1e-4;
         let record = &self.prepared.record;
-        let fitted = fit(self.point.clone(), record, &options, "refinement", progress)?;
+        let spans = self.prepared.spans(&self.point);
+        let widest: Vec<f64> = spans.iter().map(|span| 0.5 * span).collect();
+        let mut point = self.point.clone();
+        point.fill_gaps(GRID, &widest, &[-0.5, 0.0, 0.5], record);
+        let mut fitted = fit(point, record, &options, "refinement", progress)?;
+        if fitted.point.drop_unused() {
+            options.steps = STEPS / 3;
+            fitted = fit(fitted.point, record, &options, "refinement", progress)?;
+        }
         (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
         Ok(())
     }
@@ -158,7 +173,11 @@ impl<'a> Search<'a> {
         let base = Base::new(&self.point, &self.prepared.record, self.options.freedom, weighting)?;
         let values = self.prepared.values();
         let mut best: Vec<(&'static Entry, Score, f64)> = Vec::new();
-        for &entry in &self.allowed {
+        let present = |entry: &Entry| self.point.effects.iter().any(|e| e.name() == entry.name);
+        // G of any order takes a delay for itself
+        let of_use = |entry: &Entry| entry.name != "delay" || self.order_is_given;
+        let usable = |entry: &&&Entry| of_use(entry) && (entry.repeats || !present(entry));
+        for &entry in self.allowed.iter().filter(usable) {
             let candidates = base.situation(entry.candidates);
             let mut check = |done| report(progress, entry.name, done);
             for score in scores(&base, &candidates, &mut check)? {
@@ -207,7 +226,10 @@ impl<'a> Search<'a> {
         let colour = (uncertainty.used / uncertainty.estimated.max(1) as f64).max(1.0);
         /// Candidates that a round looks at: the best of so many must be better than one.
         const LOOKS: f64 = 150.0;
+        /// An effect that takes a smaller part of the residual's squares is of no use to anyone.
+        const LEAST: f64 = 0.01;
         let chance = colour * (added.max(1) as f64 * values.ln() + 2.0 * LOOKS.ln());
+        let chance = chance.max(LEAST * values);
         let deviance = values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln();
         let held_out = self.held_out(&point)?;
         Ok(Trial { entry, point, cost, deviance, chance, held_out, promised })
@@ -219,7 +241,8 @@ impl<'a> Search<'a> {
 
     /// Sum of squares of every held-out block.
     fn held_out(&self, point: &Point) -> Result<Vec<f64>, Error> {
-        let residuals = point.residuals(&self.test)?;
+        // run over the training record, whose starts were fitted
+        let residuals = point.residuals(&self.prepared.record)?;
         let weights = &self.options.weighting.outputs;
         let mut sums = Vec::new();
         for (residual, experiment) in residuals.iter().zip(self.test.experiments()) {
@@ -297,30 +320,47 @@ impl<'a> Search<'a> {
         rescale(&mut self.point);
     }
 
-    /// Replaces isolated outliers of the residual by what their neighbours say.
+    /// Replaces isolated outliers of the residual by what their neighbours say, also where the record is
+    /// held out: a wrong sample says nothing about a model.
     pub(crate) fn repair(&mut self) -> Result<(), Error> {
         let residuals = self.point.residuals(&self.prepared.record)?;
-        let places = outliers::places(&residuals, &self.prepared.record);
-        if places.iter().flatten().all(Vec::is_empty) {
-            return Ok(());
-        }
+        let whole = everything(&self.prepared.record)?;
+        let places = outliers::places(&residuals, &whole);
         self.prepared.record = repaired(&self.prepared.record, &residuals, &places)?;
+        for (known, new) in self.wrong.iter_mut().flatten().zip(places.into_iter().flatten()) {
+            known.extend(new);
+            known.sort_unstable();
+            known.dedup();
+        }
         Ok(())
     }
 }
 
-/// Whether what is held out has become smaller by more than chance: most blocks, and their sum.
+/// Whether what is held out has become smaller by more than chance: in the mean of the blocks, or in
+/// some blocks (those in which the effect shows) and hardly worse in any other.
 fn is_confirmed(before: &[f64], after: &[f64]) -> bool {
     /// The least part by which the sum must fall.
-    const LEAST: f64 = 2e-3;
+    const LEAST: f64 = 5e-3;
     /// Standard errors of the mean difference.
     const ERRORS: f64 = 1.7;
+    /// How much more the better blocks must gain than the worse ones lose.
+    const ONE_SIDED: f64 = 10.0;
     let differences: Vec<f64> = before.iter().zip(after).map(|(a, b)| a - b).collect();
     let n = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / n;
     let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
     let total: f64 = before.iter().sum();
-    mean * n > LEAST * total && mean > ERRORS * (variance / n).sqrt()
+    let gained: f64 = differences.iter().filter(|d| **d > 0.0).sum();
+    let lost: f64 = -differences.iter().filter(|d| **d < 0.0).sum::<f64>();
+    let one_sided = gained > ONE_SIDED * lost;
+    mean * n > LEAST * total && (one_sided || mean > ERRORS * (variance / n).sqrt())
+}
+
+/// The record with nothing held out.
+pub(crate) fn everything(record: &Record) -> Result<Record, Error> {
+    let mut experiments = record.experiments().to_vec();
+    experiments.iter_mut().for_each(|experiment| experiment.held_out.clear());
+    record.with_experiments(experiments)
 }
 
 /// The record with samples at `places` set to what makes their residual that of their neighbours.

@@ -313,6 +313,41 @@ impl Point {
         moved
     }
 
+    /// Puts plays and deadzones without weight into the widest gaps between those that there are, until
+    /// every input has `plays` and `deadzones`; plays up to `widest` (one an input) and, where their past is
+    /// unknown, at `sides` beside z in turn; deadzones inside the range of the input.
+    pub(crate) fn fill_gaps(
+        &mut self,
+        (plays, deadzones): (usize, usize),
+        widest: &[f64],
+        sides: &[f64],
+        record: &Record,
+    ) {
+        for (input, channel) in self.channels.iter_mut().enumerate() {
+            let mut side = sides.iter().cycle();
+            while channel.half_widths.len() < plays {
+                let mut ends = channel.half_widths.clone();
+                ends.push(widest[input].max(ends[ends.len() - 1]));
+                let Some((place, middle)) = widest_gap(&ends) else { break };
+                channel.half_widths.insert(place, middle);
+                channel.weights.insert(place, 0.0);
+                for sides in self.pasts.iter_mut().filter_map(|past| past.plays.as_mut()) {
+                    sides[input].insert(place, side.next().copied().unwrap_or(0.0));
+                }
+            }
+            let (low, high) = range(record, input);
+            while channel.thresholds.len() < deadzones + 1 {
+                let mut ends = channel.thresholds[1..].to_vec();
+                ends.extend([low, 0.0, high]);
+                ends.sort_by(f64::total_cmp);
+                let Some((_, middle)) = widest_gap(&ends) else { break };
+                let place = channel.thresholds[1..].partition_point(|&eta| eta < middle) + 1;
+                channel.thresholds.insert(place, middle);
+                channel.slopes.insert(place, 0.0);
+            }
+        }
+    }
+
     /// Drops plays and deadzones without weight and joins deadzones that have come together; says
     /// whether there were any.
     pub(crate) fn drop_unused(&mut self) -> bool {
@@ -491,6 +526,13 @@ impl Point {
         }
         moved
     }
+}
+
+/// Where a value stands that halves the widest gap of ascending ones, and the value.
+fn widest_gap(ascending: &[f64]) -> Option<(usize, f64)> {
+    let gaps = ascending.windows(2).enumerate();
+    let (place, gap) = gaps.max_by(|a, b| (a.1[1] - a.1[0]).total_cmp(&(b.1[1] - b.1[0])))?;
+    (gap[1] > gap[0]).then(|| (place + 1, 0.5 * (gap[0] + gap[1])))
 }
 
 /// Smallest and largest input of all experiments.

@@ -181,7 +181,7 @@ impl<'a> Prepared<'a> {
 }
 
 /// Whether all inputs stand at zero for a while before anything moves.
-fn starts_at_rest(experiment: &Experiment) -> bool {
+pub(crate) fn starts_at_rest(experiment: &Experiment) -> bool {
     const QUIET: usize = 10;
     let input = &experiment.input;
     let largest = input.amax();

@@ -1,0 +1,78 @@
+//! Effects of the noise: isolated wrong samples, and memory.
+
+use super::residual::{ResidualTest, STRUCTURE};
+use super::search::Search;
+use crate::effects::{ColouredNoise, Effect, Outliers};
+use crate::identify::colour::Colour;
+use crate::{Error, Matrix, Record};
+
+/// What is wrong with the noise, when everything else is explained.
+pub(crate) fn effects(
+    search: &Search,
+    residuals: &[Matrix],
+    tests: &[ResidualTest],
+    measured: &Record,
+) -> Result<Vec<Effect>, Error> {
+    let mut found = Vec::new();
+    found.extend(outliers(search, measured));
+    for output in 0..measured.outputs().len() {
+        let fails = |test: &ResidualTest| {
+            test.output == output && STRUCTURE.contains(&test.name) && !test.passed()
+        };
+        if !tests.iter().any(fails) {
+            found.extend(memory(search, residuals, output)?);
+        }
+    }
+    Ok(found)
+}
+
+/// The samples that were found wrong, by what they were changed.
+fn outliers(search: &Search, measured: &Record) -> Option<Effect> {
+    /// Fewer may be chance, or the way a record was cut.
+    const FEWEST: usize = 3;
+    let (mut count, mut squares) = (0, 0.0);
+    let pairs = measured.experiments().iter().zip(search.prepared.record.experiments());
+    for ((given, mended), places) in pairs.zip(&search.wrong) {
+        for (output, places) in places.iter().enumerate() {
+            for &k in places {
+                count += 1;
+                squares += (given.output[(k, output)] - mended.output[(k, output)]).powi(2);
+            }
+        }
+    }
+    let samples = measured.samples();
+    let size = (squares / count.max(1) as f64).sqrt();
+    (count >= FEWEST).then(|| Outliers { count, samples, size }.into())
+}
+
+/// Noise with memory, if its past predicts it: on the training data, and on what is held out.
+fn memory(search: &Search, residuals: &[Matrix], output: usize) -> Result<Option<Effect>, Error> {
+    /// The part by which the standard deviation must fall.
+    const LEAST: f64 = 0.02;
+    let colour = Colour::of(residuals, &search.prepared.record);
+    let filter = &colour.coefficients[output];
+    if filter.is_empty() {
+        return Ok(None);
+    }
+    let (own, innovation) = one_step(residuals, &search.prepared.record, output, filter);
+    let (held_out, predicted) = one_step(residuals, &search.test, output, filter);
+    let falls = |before: f64, after: f64| after < (1.0 - LEAST) * before;
+    let block = ColouredNoise { output, coefficients: filter.clone(), innovation, deviation: own };
+    Ok((falls(own, innovation) && falls(held_out, predicted)).then(|| block.into()))
+}
+
+/// Standard deviations of a residual and of what its past does not predict.
+fn one_step(residuals: &[Matrix], record: &Record, output: usize, filter: &[f64]) -> (f64, f64) {
+    let (mut own, mut left, mut count) = (0.0, 0.0, 0.0);
+    for (residual, experiment) in residuals.iter().zip(record.experiments()) {
+        let column = residual.column(output);
+        for k in experiment.scored_runs().flatten().filter(|&k| k >= filter.len()) {
+            let predicted: f64 = filter.iter().zip(1..).map(|(a, lag)| a * column[k - lag]).sum();
+            own += column[k] * column[k];
+            left += (column[k] - predicted).powi(2);
+            count += 1.0;
+        }
+    }
+    let deviation = |sum: f64| (sum / f64::max(count, 1.0)).sqrt();
+    (deviation(own), deviation(left))
+}
