@@ -17,7 +17,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # The order of `make test` is part of what it promises, also under `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench figures monte-carlo clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench figures monte-carlo scoreboard clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -70,6 +70,9 @@ figures: $(NATIVE) ## Print the figures of README; needs the measured data
 
 monte-carlo: $(NATIVE) ## Print errors over the Cramer-Rao bound and the coverage of intervals
 	$(BIN)/python tools/monte_carlo.py
+
+scoreboard: $(NATIVE) ## Print how often `explain` names the right effect; takes long
+	$(BIN)/python tools/scoreboard.py
 
 clean: ## Remove the environment, all builds and all caches
 	cargo clean

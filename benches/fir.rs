@@ -15,7 +15,13 @@ fn record(samples: usize) -> Record {
     });
     let output = Matrix::from_iterator(samples, 1, filtered);
     let input = Matrix::from_column_slice(samples, 1, &u);
-    let run = Experiment { input, output, covariates: Matrix::zeros(samples, 0), warmup: 0 };
+    let run = Experiment {
+        input,
+        output,
+        covariates: Matrix::zeros(samples, 0),
+        warmup: 0,
+        held_out: vec![],
+    };
     let channel = |name: &str| vec![Channel::new(name, "")];
     Record::new(vec![run], 1000.0, channel("u"), channel("y"), vec![]).expect("the record is valid")
 }

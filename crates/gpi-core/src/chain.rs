@@ -1,9 +1,9 @@
 //! A model's chain with its effects, a block of samples at a time.
 
-use crate::effects::{Block, Effect, Moment, Stage};
+use crate::effects::{Block, Effect, Moment, Quantity, Stage, Units};
 use crate::model::{Model, ModelState};
 use crate::operators::{GpiState, Operator, play};
-use crate::{Error, Matrix};
+use crate::{Channel, Error, Matrix};
 use nalgebra::DVector;
 
 impl Model {
@@ -37,6 +37,17 @@ impl Model {
     /// The effects, in the order of the chain.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
+    }
+
+    /// What an engineer would call an effect's parameters, with the units of this model's channels.
+    pub fn quantities(&self, effect: &Effect) -> Vec<Quantity> {
+        let block = effect.block();
+        let unit = |channels: &'_ [Channel]| {
+            let own = channels.get(block.channel()).or(channels.first());
+            own.map_or(String::new(), |channel| channel.unit.clone())
+        };
+        let (input, output) = (unit(self.inputs()), unit(self.outputs()));
+        block.quantities(Units { input: &input, output: &output })
     }
 
     pub(crate) fn validate_effects(&self) -> Result<(), Error> {

@@ -219,6 +219,14 @@ impl Model {
         self.simulate_from(&mut self.start_of(input)?, input)
     }
 
+    /// As [`Model::simulate`], with other measured columns, see [`Model::simulate_with`].
+    ///
+    /// # Errors
+    /// No sample, another number of channels than inputs, columns of another length.
+    pub fn simulate_beside(&self, input: &Matrix, covariates: &Matrix) -> Result<Matrix, Error> {
+        self.simulate_with(&mut self.start_of(input)?, input, covariates)
+    }
+
     /// The intermediate signals v (samples, inputs) that belong to [`Model::simulate`].
     ///
     /// # Errors
@@ -244,10 +252,8 @@ impl Model {
     pub fn residuals(&self, record: &Record) -> Result<Vec<Matrix>, Error> {
         let outputs = ("record's outputs", record.outputs().len());
         Error::require_equal("outputs", outputs, ("model's outputs", self.outputs.len()))?;
-        let residual = |e: &crate::Experiment| {
-            let mut state = self.start_of(&e.input)?;
-            Ok(&e.output - self.simulate_with(&mut state, &e.input, &e.covariates)?)
-        };
+        let residual =
+            |e: &crate::Experiment| Ok(&e.output - self.simulate_beside(&e.input, &e.covariates)?);
         record.experiments().iter().map(residual).collect()
     }
 

@@ -1,61 +1,318 @@
 //! Closing the loop.
 
-use crate::identify::interruptible;
+use crate::arrays::from_matrix;
+use crate::identify::{grid, interruptible_in_part};
+use crate::model::Model;
+use crate::operators::read_reading;
 use crate::record::Record;
-use gpi_core::effects::Units;
+use crate::refine::Refinement;
+use gpi_core::SimulationError;
+use gpi_core::effects::CATALOGUE;
 use gpi_core::explain as core;
+use gpi_core::identify::IdentifyOptions;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Explains a record.
-#[pyfunction]
-#[pyo3(signature = (record, *, effects = None, progress = None))]
-fn explain<'py>(
-    py: Python<'py>,
-    record: &Record,
-    effects: Option<Vec<String>>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let options = core::ExplainOptions { effects, ..core::ExplainOptions::default() };
-    let record = &record.record;
-    let found = interruptible(py, progress, |report| core::explain(record, &options, report))?;
+/// What a record's model lacked: effects, errors before and after, and what is left.
+///
+/// It comes from ``explain``.
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct Explanation {
+    found: core::Explanation,
+    record: Py<Record>,
+    refinement: Py<Refinement>,
+}
+
+fn error_dict<'py>(py: Python<'py>, error: &SimulationError) -> PyResult<Bound<'py, PyDict>> {
     let result = PyDict::new(py);
-    result.set_item("effects", found.effects.clone())?;
-    let steps: Vec<_> = found
-        .steps
-        .iter()
-        .map(|s| (s.effect, s.deviance, s.chance, s.train_rms, s.holdout_rms))
-        .collect();
-    result.set_item("steps", steps)?;
-    let rejected: Vec<_> = found
-        .rejected
-        .iter()
-        .map(|r| (r.effect, r.holdout_rms, r.why.clone(), r.confounded_with.clone()))
-        .collect();
-    result.set_item("rejected", rejected)?;
-    result.set_item("before", (found.before.0.rms, found.before.1.rms))?;
-    result.set_item("after", (found.after.0.rms, found.after.1.rms))?;
-    result.set_item("noise", found.noise_floor.rms.clone())?;
-    let units = Units { input: "V", output: "um" };
-    let blocks: Vec<_> = found
-        .blocks
-        .iter()
-        .map(|b| {
-            let quantities = b.block().quantities(units);
-            (
-                b.name(),
-                quantities.into_iter().map(|q| (q.name, q.value, q.unit)).collect::<Vec<_>>(),
-            )
-        })
-        .collect();
-    result.set_item("blocks", blocks)?;
-    let tests: Vec<_> =
-        found.tests.iter().map(|t| (t.name, t.statistic, t.threshold, t.p_value)).collect();
-    result.set_item("tests", tests)?;
-    result.set_item("model", found.model.to_json().unwrap_or_default())?;
+    result.set_item("rms", error.rms)?;
+    result.set_item("nrmse", error.nrmse)?;
+    result.set_item("fit_percent", error.fit_percent)?;
+    result.set_item("max", error.max)?;
     Ok(result)
 }
 
+fn errors_dict<'py>(py: Python<'py>, errors: &core::Errors) -> PyResult<Bound<'py, PyDict>> {
+    let result = PyDict::new(py);
+    result.set_item("train", error_dict(py, &errors.train)?)?;
+    result.set_item("holdout", error_dict(py, &errors.holdout)?)?;
+    Ok(result)
+}
+
+#[pymethods]
+impl Explanation {
+    /// Names of the accepted effects, in the order they were added.
+    #[getter]
+    fn effects(&self) -> Vec<&'static str> {
+        self.found.effects.clone()
+    }
+
+    /// The model with all effects.
+    #[getter]
+    fn model(&self, py: Python<'_>) -> Model {
+        let refinement = Some(self.refinement.clone_ref(py));
+        Model { model: self.found.model.clone(), identification: None, refinement }
+    }
+
+    /// The declared model alone.
+    #[getter]
+    fn base(&self) -> Model {
+        Model { model: self.found.base.clone(), identification: None, refinement: None }
+    }
+
+    /// The record that was explained.
+    #[getter]
+    fn record(&self, py: Python<'_>) -> Py<Record> {
+        self.record.clone_ref(py)
+    }
+
+    /// Errors of the declared model: ``train`` and ``holdout``, each as ``Model.error`` returns it.
+    #[getter]
+    fn before<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        errors_dict(py, &self.found.before)
+    }
+
+    /// Errors with all effects; wrong samples that were found are not scored.
+    #[getter]
+    fn after<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        errors_dict(py, &self.found.after)
+    }
+
+    /// ``explained`` (what is left is noise), ``partly-explained`` or ``unattributed``.
+    #[getter]
+    fn verdict(&self) -> &'static str {
+        self.found.verdict.name()
+    }
+
+    /// The declared model, then each effect: ``effect`` (None first), ``parameters`` (rows of ``name``,
+    /// ``value``, ``std``, ``unit``), ``evidence`` (``promised``, ``deviance``, ``chance``, ``dropped``),
+    /// ``train_rms``, ``holdout_rms``.
+    #[getter]
+    fn steps<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let step = |step: &core::Step| {
+            let row = PyDict::new(py);
+            row.set_item("effect", step.effect)?;
+            let parameters = step.parameters.iter().zip(&step.units).map(|(parameter, unit)| {
+                let row = PyDict::new(py);
+                row.set_item("name", &parameter.name)?;
+                row.set_item("value", parameter.value)?;
+                row.set_item("std", Some(parameter.deviation).filter(|std| std.is_finite()))?;
+                row.set_item("unit", unit)?;
+                PyResult::Ok(row)
+            });
+            row.set_item("parameters", parameters.collect::<PyResult<Vec<_>>>()?)?;
+            let evidence = PyDict::new(py);
+            evidence.set_item("promised", step.promised)?;
+            evidence.set_item("deviance", step.deviance)?;
+            evidence.set_item("chance", step.chance)?;
+            evidence.set_item("dropped", step.dropped.clone())?;
+            row.set_item("evidence", evidence)?;
+            row.set_item("train_rms", step.train_rms)?;
+            row.set_item("holdout_rms", step.holdout_rms)?;
+            Ok(row)
+        };
+        self.found.steps.iter().map(step).collect()
+    }
+
+    /// Effects that were tried and not taken: ``effect``, ``holdout_rms``, ``why``, ``confounded_with``.
+    #[getter]
+    fn rejected<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let one = |one: &core::Rejected| {
+            let row = PyDict::new(py);
+            row.set_item("effect", one.effect)?;
+            row.set_item("holdout_rms", one.holdout_rms)?;
+            row.set_item("why", &one.why)?;
+            row.set_item("confounded_with", one.confounded_with.clone())?;
+            Ok(row)
+        };
+        self.found.rejected.iter().map(one).collect()
+    }
+
+    /// Tests of what is left: ``name``, ``output``, ``statistic``, ``threshold``, ``p_value``, ``passed``,
+    /// ``points_to``.
+    #[getter]
+    fn tests<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        test_rows(py, &self.found.tests, &self.found.model)
+    }
+
+    /// The noise of each output, as ``Refinement.noise_floor``.
+    #[getter]
+    fn noise_floor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.refinement.bind(py).getattr("noise_floor")
+    }
+
+    /// What to measure next: ``why`` and ``command``; None when nothing more is to be learnt.
+    #[getter]
+    fn next_experiment<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(next) = &self.found.next_experiment else { return Ok(None) };
+        let row = PyDict::new(py);
+        row.set_item("why", &next.why)?;
+        row.set_item("command", &next.command)?;
+        Ok(Some(row))
+    }
+
+    /// Measured minus simulated output of the declared model, one (samples, outputs) an experiment.
+    #[getter]
+    fn residuals_before<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
+        self.found.residuals_before.iter().map(|residual| from_matrix(py, residual)).collect()
+    }
+
+    /// The same with all effects.
+    #[getter]
+    fn residuals_after<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
+        self.found.residuals_after.iter().map(|residual| from_matrix(py, residual)).collect()
+    }
+
+    /// Held-out samples of each experiment: pairs of first and one past the last.
+    #[getter]
+    fn held_out(&self) -> Vec<Vec<(usize, usize)>> {
+        let pairs = |blocks: &Vec<std::ops::Range<usize>>| {
+            blocks.iter().map(|block| (block.start, block.end)).collect()
+        };
+        self.found.held_out.iter().map(pairs).collect()
+    }
+
+    /// Whether the search was stopped before it had finished.
+    #[getter]
+    fn interrupted(&self) -> bool {
+        self.found.interrupted
+    }
+
+    /// All of it as the JSON object ``gpi-explanation/1``.
+    fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let module = slf.py().import("gpi_hammerstein.explanation")?;
+        module.call_method1("to_dict", (slf,))
+    }
+
+    fn __repr__(&self) -> String {
+        let (before, after) = (self.found.before.holdout.rms, self.found.after.holdout.rms);
+        let effects = self.found.effects.join(", ");
+        format!("Explanation([{effects}], {}, {before:.4e} -> {after:.4e})", self.verdict())
+    }
+}
+
+fn test_rows<'py>(
+    py: Python<'py>,
+    tests: &[core::ResidualTest],
+    model: &gpi_core::Model,
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let row = |test: &core::ResidualTest| {
+        let row = PyDict::new(py);
+        row.set_item("name", test.name)?;
+        row.set_item("output", &model.outputs()[test.output].name)?;
+        row.set_item("statistic", test.statistic)?;
+        row.set_item("threshold", test.threshold)?;
+        row.set_item("p_value", test.p_value)?;
+        row.set_item("passed", test.passed())?;
+        row.set_item("points_to", test.points_to)?;
+        Ok(row)
+    };
+    tests.iter().map(row).collect()
+}
+
+/// Finds out what a record's model lacks, adds it, and reports the error before and after.
+///
+/// The declared model (deadzones, plays, G) is identified without ten blocks of time that are kept for
+/// the test. Every candidate of the catalogue is ranked by a score test, the best few are fitted jointly
+/// with the model, and the one that explains most stays if it gains more than chance and the held-out
+/// blocks confirm it; until nothing more is confirmed.
+///
+/// Parameters
+/// ----------
+/// record : Record
+///     Measured input and output.
+/// holdout : Record, optional
+///     Another experiment of the same actuator to test on. Effects that the input does not drive are left
+///     out there.
+/// effects : sequence of str, optional
+///     Names of the effects that may be added (see ``effect_names``); all when left out, none when empty.
+/// order : int, optional
+///     States of the linear part; a mode that it lacks is then an effect, and a delay too.
+/// half_widths, thresholds : int or array_like, optional
+///     How many plays and deadzones, or which ones.
+/// delay : int, optional
+///     Makes G a gain with this delay, in samples.
+/// reading : str
+///     ``one-sided`` or ``directional`` deadzones.
+/// progress : callable, optional
+///     Called with a stage's name and the fraction done. An exception ends the search, as Ctrl-C does:
+///     what was found so far is returned, with ``interrupted`` set; before the declared model is
+///     identified the exception is raised.
+///
+/// Returns
+/// -------
+/// Explanation
+///     Effects, model, errors before and after, tests of what is left.
+///
+/// Raises
+/// ------
+/// DataError
+///     As ``identify``.
+/// ParameterError
+///     An effect that is not in the catalogue.
+///
+/// Examples
+/// --------
+/// >>> found = gpi.explain(gpi.read_record("run.csv"))  # doctest: +SKIP
+/// >>> found.effects, found.verdict  # doctest: +SKIP
+/// (['creep'], 'explained')
+#[pyfunction]
+#[pyo3(signature = (record, holdout = None, *, effects = None, order = None, half_widths = None,
+    thresholds = None, delay = None, reading = "one-sided", progress = None))]
+#[allow(clippy::too_many_arguments)]
+fn explain(
+    py: Python<'_>,
+    record: Py<Record>,
+    holdout: Option<&Record>,
+    effects: Option<Vec<String>>,
+    order: Option<usize>,
+    half_widths: Option<&Bound<'_, PyAny>>,
+    thresholds: Option<&Bound<'_, PyAny>>,
+    delay: Option<usize>,
+    reading: &str,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Explanation> {
+    let identify = IdentifyOptions {
+        order,
+        delay,
+        half_widths: grid("half_widths", half_widths)?,
+        thresholds: grid("thresholds", thresholds)?,
+        reading: read_reading(reading)?,
+        ..IdentifyOptions::default()
+    };
+    let options = core::ExplainOptions { identify, effects };
+    let own = record.bind(py).borrow();
+    let (measured, holdout) = (&own.record, holdout.map(|other| &other.record));
+    let found = interruptible_in_part(py, progress, |report| {
+        core::explain(measured, holdout, &options, report)
+    })?;
+    drop(own);
+    let refinement = Py::new(py, Refinement { refinement: found.refinement.clone() })?;
+    Ok(Explanation { found, record, refinement })
+}
+
+/// Names of all effects that ``explain`` knows, in the order of the chain, and what they are.
+///
+/// Returns
+/// -------
+/// dict
+///     Name to description.
+///
+/// Examples
+/// --------
+/// >>> gpi.effect_names()["creep"]
+/// "slow relaxation driven by the actuator's own motion"
+#[pyfunction]
+fn effect_names(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let names = PyDict::new(py);
+    for entry in CATALOGUE {
+        names.set_item(entry.name, entry.what)?;
+    }
+    Ok(names)
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Explanation>()?;
+    module.add_function(wrap_pyfunction!(effect_names, module)?)?;
     module.add_function(wrap_pyfunction!(explain, module)?)
 }

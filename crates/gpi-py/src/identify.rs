@@ -12,7 +12,7 @@ use gpi_core::identify::{self as core, Grid, IdentifyOptions};
 use pyo3::prelude::*;
 
 /// A count, or values.
-fn grid(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Grid>> {
+pub(crate) fn grid(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Grid>> {
     let Some(value) = value else { return Ok(None) };
     if let Ok(count) = value.extract::<usize>() {
         return Ok(Some(Grid::Count(count)));
@@ -27,6 +27,29 @@ pub(crate) fn interruptible<T: Send>(
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(core::Progress) -> Result<T, Error> + Send,
 ) -> PyResult<T> {
+    match in_part(py, progress, work) {
+        (_, Some(exception)) => Err(exception),
+        (result, None) => result.map_err(to_python),
+    }
+}
+
+/// The same for work that returns what it has when it is stopped.
+pub(crate) fn interruptible_in_part<T: Send>(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(core::Progress) -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    match in_part(py, progress, work) {
+        (Err(Error::Interrupted), Some(exception)) => Err(exception),
+        (result, _) => result.map_err(to_python),
+    }
+}
+
+fn in_part<T: Send>(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(core::Progress) -> Result<T, Error> + Send,
+) -> (Result<T, Error>, Option<PyErr>) {
     let mut raised = None;
     let result = py.detach(|| {
         let mut report = |stage: &str, done: f64| {
@@ -42,10 +65,7 @@ pub(crate) fn interruptible<T: Send>(
         };
         work(&mut report)
     });
-    match raised {
-        Some(exception) => Err(exception),
-        None => result.map_err(to_python),
-    }
+    (result, raised)
 }
 
 /// A hysteresis fitted to an input and an intermediate signal.

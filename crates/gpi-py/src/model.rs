@@ -146,14 +146,43 @@ impl Model {
         self.refinement.as_ref().map(|refinement| refinement.clone_ref(py))
     }
 
+    /// The effects of the catalogue that the model has, in the order of the chain: ``name``, and
+    /// ``parameters`` (rows of ``name``, ``value``, ``unit``).
+    #[getter]
+    fn effects<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let describe = |effect: &gpi_core::effects::Effect| {
+            let row = PyDict::new(py);
+            row.set_item("name", effect.name())?;
+            let parameters = self.model.quantities(effect).into_iter().map(|quantity| {
+                let row = PyDict::new(py);
+                row.set_item("name", quantity.name)?;
+                row.set_item("value", quantity.value)?;
+                row.set_item("unit", quantity.unit)?;
+                PyResult::Ok(row)
+            });
+            row.set_item("parameters", parameters.collect::<PyResult<Vec<_>>>()?)?;
+            Ok(row)
+        };
+        self.model.effects().iter().map(describe).collect()
+    }
+
     /// The output for u, shape (samples,) or (samples, inputs).
     ///
     /// The actuator is taken to have been raised from zero to the first sample once, and to have stood
-    /// there before. Use ``start`` and ``run`` for another past.
-    fn simulate<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    /// there before. Use ``start`` and ``run`` for another past. ``covariates``, shape (samples,) or
+    /// (samples, columns), are other measured columns that an effect of the model may let leak in.
+    #[pyo3(signature = (u, *, covariates = None))]
+    fn simulate<'py>(
+        &self,
+        u: &Bound<'py, PyAny>,
+        covariates: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let (input, one_dimensional) = signal("u", u)?;
-        let output = self.model.simulate(&input).map_err(to_python)?;
-        Ok(from_signal(u.py(), &output, one_dimensional))
+        let output = match covariates {
+            None => self.model.simulate(&input),
+            Some(columns) => self.model.simulate_beside(&input, &signal("covariates", columns)?.0),
+        };
+        Ok(from_signal(u.py(), &output.map_err(to_python)?, one_dimensional))
     }
 
     /// The intermediate signal v that belongs to ``simulate``, shaped like u.

@@ -10,6 +10,7 @@ import typer
 from gpi_hammerstein._native import DataError, ParameterError, __version__
 from gpi_hammerstein.cli.demo import demo
 from gpi_hammerstein.cli.excite import excite
+from gpi_hammerstein.cli.explain import explain
 from gpi_hammerstein.cli.identify import identify
 from gpi_hammerstein.cli.output import complain
 from gpi_hammerstein.cli.reproduce import reproduce
@@ -44,7 +45,7 @@ def _options(
     pass
 
 
-for command in (demo, identify, simulate, validate):
+for command in (demo, identify, explain, simulate, validate):
     app.command()(command)
 app.add_typer(excite, name="excite")
 app.add_typer(reproduce, name="reproduce")

@@ -5,8 +5,27 @@ Every function draws on the axes it is given and returns them. Without axes it m
 to each side, 95 % where the errors are normal.
 """
 
+from gpi_hammerstein.plot.explanation import (
+    loops,
+    residual_in_time,
+    residual_over_input,
+    residual_spectrum,
+)
 from gpi_hammerstein.plot.linear import bode, markov, singular_values
 from gpi_hammerstein.plot.search import candidates, history
 from gpi_hammerstein.plot.signals import fit, loop, residual
 
-__all__ = ["bode", "candidates", "fit", "history", "loop", "markov", "residual", "singular_values"]
+__all__ = [
+    "bode",
+    "candidates",
+    "fit",
+    "history",
+    "loop",
+    "loops",
+    "markov",
+    "residual",
+    "residual_in_time",
+    "residual_over_input",
+    "residual_spectrum",
+    "singular_values",
+]

@@ -10,7 +10,7 @@ use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 pub struct Stiffness {
     /// The output whose displacement acts back.
     pub output: usize,
-    /// e_2 by states, then e_3 by states.
+    /// e_2 by states of G, then e_3; states of its dead time, which come first, are not driven.
     pub drives: Vec<f64>,
     /// s, half the span of the displacement.
     pub scale: f64,

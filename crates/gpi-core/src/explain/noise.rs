@@ -11,11 +11,10 @@ pub(crate) fn effects(
     search: &Search,
     residuals: &[Matrix],
     tests: &[ResidualTest],
-    measured: &Record,
 ) -> Result<Vec<Effect>, Error> {
     let mut found = Vec::new();
-    found.extend(outliers(search, measured));
-    for output in 0..measured.outputs().len() {
+    found.extend(outliers(search));
+    for output in 0..search.measured.outputs().len() {
         let fails = |test: &ResidualTest| {
             test.output == output && STRUCTURE.contains(&test.name) && !test.passed()
         };
@@ -27,10 +26,11 @@ pub(crate) fn effects(
 }
 
 /// The samples that were found wrong, by what they were changed.
-fn outliers(search: &Search, measured: &Record) -> Option<Effect> {
+fn outliers(search: &Search) -> Option<Effect> {
     /// Fewer may be chance, or the way a record was cut.
     const FEWEST: usize = 3;
     let (mut count, mut squares) = (0, 0.0);
+    let measured = &search.measured;
     let pairs = measured.experiments().iter().zip(search.prepared.record.experiments());
     for ((given, mended), places) in pairs.zip(&search.wrong) {
         for (output, places) in places.iter().enumerate() {
@@ -48,7 +48,7 @@ fn outliers(search: &Search, measured: &Record) -> Option<Effect> {
 /// Noise with memory, if its past predicts it: on the training data, and on what is held out.
 fn memory(search: &Search, residuals: &[Matrix], output: usize) -> Result<Option<Effect>, Error> {
     /// The part by which the standard deviation must fall.
-    const LEAST: f64 = 0.02;
+    const LEAST: f64 = 0.1;
     let colour = Colour::of(residuals, &search.prepared.record);
     let filter = &colour.coefficients[output];
     if filter.is_empty() {

@@ -1,5 +1,6 @@
 //! What a residual still contains: named tests, each with what it points to.
 
+use crate::identify::colour::Colour;
 use crate::identify::outliers;
 use crate::{Error, Matrix, Record};
 use num_complex::Complex64;
@@ -30,10 +31,11 @@ impl ResidualTest {
 }
 
 /// Names of the tests that show a dependence on the input or on time: more than noise with memory.
-pub(crate) const STRUCTURE: [&str; 7] =
-    ["past-input", "level", "speed", "direction", "higher-order", "trend", "lines"];
+pub(crate) const STRUCTURE: [&str; 8] =
+    ["past-input", "level", "speed", "direction", "amplitude", "higher-order", "trend", "lines"];
 
 /// Signals that the residual is compared with, each (samples, channels), one an experiment.
+#[derive(Clone, Copy)]
 pub(crate) struct Beside<'a> {
     pub record: &'a Record,
     pub residuals: &'a [Matrix],
@@ -44,23 +46,39 @@ pub(crate) struct Beside<'a> {
 /// All tests of every output.
 pub(crate) fn analyse(beside: &Beside) -> Result<Vec<ResidualTest>, Error> {
     let mut tests = Vec::new();
+    // A line stands out of a steep spectrum only once that is flat.
+    let flat = Colour::of(beside.residuals, beside.record).whiten(beside.residuals);
+    let whitened = Beside { residuals: &flat, ..*beside };
+    let squares: Vec<Matrix> = beside
+        .residuals
+        .iter()
+        .map(|residual| {
+            let mean = residual.map(|value| value * value).row_mean();
+            Matrix::from_fn(residual.nrows(), residual.ncols(), |k, o| {
+                residual[(k, o)] * residual[(k, o)] - mean[o]
+            })
+        })
+        .collect();
     for output in 0..beside.record.outputs().len() {
         tests.push(whiteness(beside, output));
-        tests.push(lines(beside, output));
+        tests.push(lines(&whitened, output));
         for (name, points_to, regressors) in families(beside, output) {
             tests.push(independence(beside, output, name, points_to, &regressors));
         }
+        let loudness = Beside { residuals: &squares, ..*beside };
+        let all = families(beside, output).into_iter().filter(|family| family.0 != "past-input");
+        let regressors: Regressors = all.flat_map(|family| family.2).collect();
+        let points_to = "noise that depends on the input or on time, many small effects";
+        tests.push(independence(&loudness, output, "higher-order", points_to, &regressors));
         tests.push(wrong_samples(beside, output));
     }
     // Bonferroni: a hundredth for all tests together
     let each = 0.01 / tests.len() as f64;
-    for test in &mut tests {
-        test.threshold = match test.name {
-            "whiteness" => chi_square_above(each, LAGS as f64),
-            "outliers" => 2.0,
-            "lines" => test.threshold,
-            _ => test.threshold,
-        };
+    /// Less of a residual's variance in its correlations is of no practical size, however sure.
+    const SMALL: f64 = 0.01;
+    let small = SMALL * beside.record.scored() as f64;
+    for test in tests.iter_mut().filter(|test| test.name == "whiteness") {
+        test.threshold = chi_square_above(each, LAGS as f64).max(small);
     }
     Ok(tests)
 }
@@ -160,7 +178,7 @@ fn families(beside: &Beside, output: usize) -> Vec<(&'static str, &'static str, 
     let x = level();
     let speeds: Vec<Vec<f64>> = runs()
         .map(|(e, _)| {
-            let u = e.input.column(0.min(e.input.ncols() - 1));
+            let u = e.input.column(0);
             (0..u.len()).map(|k| if k == 0 { 0.0 } else { (u[k] - u[k - 1]) * rate }).collect()
         })
         .collect();
@@ -186,6 +204,15 @@ fn families(beside: &Beside, output: usize) -> Vec<(&'static str, &'static str, 
         x.iter()
             .map(|x| (0..x.len()).map(|k| f(2.0 * k as f64 / x.len() as f64 - 1.0)).collect())
             .collect()
+    };
+    let scaled: Vec<Vec<f64>> =
+        speeds.iter().map(|s| s.iter().map(|s| s / scale).collect()).collect();
+    let swell = |x: &[Vec<f64>], signal: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let pairs = x.iter().zip(signal);
+        let product = |(x, signal): (&Vec<f64>, &Vec<f64>)| {
+            swelling(x, 0.05 * rate).iter().zip(signal).map(|(a, b)| a * b).collect()
+        };
+        pairs.map(product).collect()
     };
     vec![
         (
@@ -224,6 +251,7 @@ fn families(beside: &Beside, output: usize) -> Vec<(&'static str, &'static str, 
                 map(&|x, s| sign(s) * x.powi(3)),
             ],
         ),
+        ("amplitude", "stiffness", vec![swell(&x, &x), swell(&x, &scaled)]),
         (
             "trend",
             "drift, gain-drift, creep",
@@ -236,6 +264,21 @@ fn families(beside: &Beside, output: usize) -> Vec<(&'static str, &'static str, 
             ],
         ),
     ]
+}
+
+/// How large the swings of a signal are at each sample: the square of what is fast in it, smoothed over
+/// so many samples.
+fn swelling(signal: &[f64], samples: f64) -> Vec<f64> {
+    let keep = (-1.0 / samples.max(1.0)).exp();
+    let (mut slow, mut square) = (signal.first().copied().unwrap_or(0.0), 0.0);
+    signal
+        .iter()
+        .map(|&value| {
+            slow = keep * slow + (1.0 - keep) * value;
+            square = keep * square + (1.0 - keep) * (value - slow).powi(2);
+            square
+        })
+        .collect()
 }
 
 /// The largest of the regressors' `t = sum_b g_b / sqrt(sum_b g_b^2)`, with g_b the product of residual and

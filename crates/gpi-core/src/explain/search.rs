@@ -48,16 +48,23 @@ pub(crate) struct Round {
     pub dropped: Vec<&'static str>,
 }
 
+/// Plays and deadzones of an input, each as far as they pay.
+const GRIDS: [(usize, usize); 3] = [(20, 9), (28, 13), (36, 17)];
+
 pub(crate) struct Search<'a> {
     pub prepared: Prepared<'a>,
+    /// The prepared record as it was measured, wrong samples included.
+    pub measured: Record,
     /// Where what the training holds out is scored.
     pub test: Record,
     pub options: FitOptions,
     pub allowed: Vec<&'static Entry>,
     /// Whether a mode that G lacks is an effect; else it is an order that G was not given.
     pub order_is_given: bool,
-    /// Which grids may move.
-    pub moving: RefineOptions,
+    /// Which of `GRIDS` the model has.
+    grid: usize,
+    /// Whether a finer grid was tried since the latest effect.
+    is_rich: bool,
     pub point: Point,
     pub cost: f64,
     pub rounds: Vec<Round>,
@@ -74,7 +81,7 @@ impl<'a> Search<'a> {
         refined: &Refined,
         allowed: Vec<&'static Entry>,
         order_is_given: bool,
-        spikes: Vec<Vec<Vec<usize>>>,
+        measured: Record,
     ) -> Result<Self, Error> {
         /// Levenberg-Marquardt steps of a trial.
         const STEPS: usize = 12;
@@ -87,11 +94,13 @@ impl<'a> Search<'a> {
             options,
             allowed,
             order_is_given,
-            moving: RefineOptions::default(),
+            grid: 0,
+            is_rich: false,
             point: refined.fitted.point.clone(),
             cost: refined.fitted.linearization.cost,
             rounds: Vec::new(),
-            wrong: spikes,
+            wrong: Vec::new(),
+            measured,
             last: Vec::new(),
         })
     }
@@ -113,7 +122,14 @@ impl<'a> Search<'a> {
     fn round(&mut self, progress: Progress) -> Result<(), Error> {
         /// Families that are fitted; the score test's best are rarely wrong.
         const FITTED: usize = 4;
-        let ranked = self.ranked(progress)?;
+        /// Part of the residual's squares.
+        const STRONG: f64 = 0.6;
+        let mut ranked = self.ranked(progress)?;
+        // A strong candidate is looked at first: the grid would bend to what it explains.
+        let strong = ranked.first().is_some_and(|(_, score)| score.gain > STRONG);
+        if !strong && !self.is_rich && self.enrich(progress)? {
+            ranked = self.ranked(progress)?;
+        }
         let before = self.held_out(&self.point)?;
         let mut trials = Vec::new();
         for (entry, score) in ranked.into_iter().take(FITTED) {
@@ -146,10 +162,37 @@ impl<'a> Search<'a> {
     /// Moves half-widths and thresholds, which were placed before the latest effect was known: what a
     /// badly placed grid leaves looks like another effect.
     fn place_grids(&mut self, progress: Progress) -> Result<(), Error> {
+        (self.point, self.cost) = self.with_grid(GRIDS[self.grid], progress)?;
+        self.is_rich = false;
+        Ok(())
+    }
+
+    /// Takes finer grids as long as they pay: what the declared model itself can explain is no effect.
+    fn enrich(&mut self, progress: Progress) -> Result<bool, Error> {
+        let values = self.prepared.values();
+        let mut gained = false;
+        while let Some(&grid) = GRIDS.get(self.grid + 1) {
+            let (point, cost) = self.with_grid(grid, progress)?;
+            let unknowns = |point: &Point| {
+                point.channels.iter().map(|c| 2 * (c.weights.len() + c.slopes.len())).sum::<usize>()
+            };
+            let added = unknowns(&point).saturating_sub(unknowns(&self.point)).max(1) as f64;
+            if values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln() < added * values.ln() {
+                break;
+            }
+            (self.point, self.cost) = (point, cost);
+            self.grid += 1;
+            gained = true;
+        }
+        self.is_rich = true;
+        Ok(gained)
+    }
+
+    /// The present point with as many plays and deadzones an input, where they pay.
+    fn with_grid(&self, grid: (usize, usize), progress: Progress) -> Result<(Point, f64), Error> {
         const STEPS: usize = 15;
-        /// Plays and deadzones of an input that are tried.
-        const GRID: (usize, usize) = (20, 9);
-        let free = RefineOptions { thresholds: true, half_widths: true, ..self.moving };
+        let free =
+            RefineOptions { thresholds: true, half_widths: true, ..RefineOptions::default() };
         let mut options = settings(&self.prepared, &free, STEPS);
         options.weighting = self.options.weighting.clone();
         options.gain = 1e-4;
@@ -157,14 +200,13 @@ impl<'a> Search<'a> {
         let spans = self.prepared.spans(&self.point);
         let widest: Vec<f64> = spans.iter().map(|span| 0.5 * span).collect();
         let mut point = self.point.clone();
-        point.fill_gaps(GRID, &widest, &[-0.5, 0.0, 0.5], record);
+        point.fill_gaps(grid, &widest, &[-0.5, 0.0, 0.5], record);
         let mut fitted = fit(point, record, &options, "refinement", progress)?;
         if fitted.point.drop_unused() {
             options.steps = STEPS / 3;
             fitted = fit(fitted.point, record, &options, "refinement", progress)?;
         }
-        (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
-        Ok(())
+        Ok((fitted.point, fitted.linearization.cost))
     }
 
     /// The best candidate of each family, the most promising first.
@@ -227,7 +269,7 @@ impl<'a> Search<'a> {
         /// Candidates that a round looks at: the best of so many must be better than one.
         const LOOKS: f64 = 150.0;
         /// An effect that takes a smaller part of the residual's squares is of no use to anyone.
-        const LEAST: f64 = 0.01;
+        const LEAST: f64 = 0.04;
         let chance = colour * (added.max(1) as f64 * values.ln() + 2.0 * LOOKS.ln());
         let chance = chance.max(LEAST * values);
         let deviance = values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln();
@@ -322,16 +364,13 @@ impl<'a> Search<'a> {
 
     /// Replaces isolated outliers of the residual by what their neighbours say, also where the record is
     /// held out: a wrong sample says nothing about a model.
+    ///
+    /// Each time from what was measured: samples that an effect makes stand apart are wrong only until it
+    /// is known.
     pub(crate) fn repair(&mut self) -> Result<(), Error> {
-        let residuals = self.point.residuals(&self.prepared.record)?;
-        let whole = everything(&self.prepared.record)?;
-        let places = outliers::places(&residuals, &whole);
-        self.prepared.record = repaired(&self.prepared.record, &residuals, &places)?;
-        for (known, new) in self.wrong.iter_mut().flatten().zip(places.into_iter().flatten()) {
-            known.extend(new);
-            known.sort_unstable();
-            known.dedup();
-        }
+        let residuals = self.point.residuals(&self.measured)?;
+        self.wrong = outliers::places(&residuals, &everything(&self.measured)?);
+        self.prepared.record = repaired(&self.measured, &residuals, &self.wrong)?;
         Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 use super::point::Point;
 use super::refine::Refinement;
+use crate::effects::{Effect, Units};
 use crate::linear::Sections;
 use crate::{Error, Matrix};
 use nalgebra::{DMatrix, DVector};
@@ -42,6 +43,24 @@ impl Refinement {
         let values = self.layout.values(&self.point);
         let moved = |step: &DVector<f64>| function(&self.point.moved(step, &self.layout));
         self.uncertainty.spread(&values, moved)
+    }
+
+    /// Standard deviations of the quantities of every effect.
+    pub(crate) fn effect_deviations(&self) -> Result<Vec<Vec<f64>>, Error> {
+        let units = Units { input: "", output: "" };
+        let quantities = |point: &Point| -> Vec<Vec<f64>> {
+            let of = |effect: &Effect| {
+                effect.block().quantities(units).iter().map(|q| q.value).collect()
+            };
+            point.blocks().iter().map(of).collect()
+        };
+        let sizes: Vec<usize> = quantities(&self.point).iter().map(Vec::len).collect();
+        if sizes.iter().sum::<usize>() == 0 {
+            return Ok(vec![Vec::new(); sizes.len()]);
+        }
+        let deviations = self.spread(|point| Ok(quantities(point).concat()))?;
+        let mut rest = deviations.into_iter();
+        Ok(sizes.iter().map(|&size| rest.by_ref().take(size).collect()).collect())
     }
 
     /// The poles of G and how far they may be off.

@@ -53,6 +53,23 @@ impl Colour {
     }
 }
 
+impl Colour {
+    /// Residuals without what their past predicts; the first samples, whose past is not known, are zero.
+    pub(crate) fn whiten(&self, residuals: &[Matrix]) -> Vec<Matrix> {
+        let whiten = |residual: &Matrix| {
+            Matrix::from_fn(residual.nrows(), residual.ncols(), |k, output| {
+                let filter = &self.coefficients[output];
+                if k < filter.len() {
+                    return 0.0;
+                }
+                let past = filter.iter().zip(1..).map(|(a, lag)| a * residual[(k - lag, output)]);
+                residual[(k, output)] - past.sum::<f64>()
+            })
+        };
+        residuals.iter().map(whiten).collect()
+    }
+}
+
 /// The autoregression with the least Bayesian information criterion.
 fn levinson(covariances: &[f64], samples: usize) -> Vec<f64> {
     let mut filter: Vec<f64> = Vec::new();

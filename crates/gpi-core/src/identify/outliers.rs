@@ -34,11 +34,13 @@ pub(crate) fn count(residuals: &[Matrix], record: &Record) -> usize {
 /// The scored samples of signals (samples, outputs) that stand apart, `[experiment][output]`.
 ///
 /// A sample stands apart when it differs from the median of its four neighbours by more than six robust
-/// standard deviations of such differences, and by four times more than any sample a little further
-/// away: slow or structured signals have none, however rough.
+/// standard deviations of such differences, and by four times more than the samples a little further away
+/// (but for two, which may be wrong themselves): slow or structured signals have none, however rough.
 pub(crate) fn places(signals: &[Matrix], record: &Record) -> Vec<Vec<Vec<usize>>> {
     const APART: f64 = 6.0;
     const ALONE: f64 = 4.0;
+    /// Outliers that may be near.
+    const OTHERS: usize = 2;
     /// Of the samples around; the nearest two have this one among their neighbours.
     const AROUND: std::ops::RangeInclusive<usize> = 3..=12;
     let mut found = vec![vec![Vec::new(); record.outputs().len()]; signals.len()];
@@ -54,9 +56,15 @@ pub(crate) fn places(signals: &[Matrix], record: &Record) -> Vec<Vec<Vec<usize>>
         {
             let size = |k: Option<usize>| k.and_then(|k| values.get(k)).map_or(0.0, |d| d.abs());
             let alone = |&k: &usize| {
-                let around = AROUND.map(|lag| size(k.checked_sub(lag)).max(size(Some(k + lag))));
                 let own = size(Some(k));
-                own > limit && own > ALONE * around.fold(0.0, f64::max)
+                if own <= limit {
+                    return false;
+                }
+                let mut around: Vec<f64> = AROUND
+                    .flat_map(|lag| [size(k.checked_sub(lag)), size(Some(k + lag))])
+                    .collect();
+                around.sort_by(|a, b| b.total_cmp(a));
+                own > ALONE * around[OTHERS]
             };
             found[index][output] = experiment.scored_runs().flatten().filter(alone).collect();
         }

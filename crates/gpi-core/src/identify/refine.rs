@@ -129,7 +129,7 @@ pub fn refine(
             remedy: "a refinement starts from a stable model",
         });
     }
-    let refined = joint(point, &prepared, options, f64::INFINITY, progress)?;
+    let refined = joint(point, &prepared, options, f64::INFINITY, false, progress)?;
     let refinement = refined.finish(&prepared, progress)?;
     Ok((refinement.point.to_model(record, &prepared.record, &prepared.means)?, refinement))
 }
@@ -165,12 +165,14 @@ pub(crate) fn settings(prepared: &Prepared, options: &RefineOptions, steps: usiz
 
 /// Refines all parts of a point at once.
 ///
-/// `hopeless` is a cost: a fit that has not come below it after a few steps is left there.
+/// `hopeless` is a cost: a fit that has not come below it after a few steps is left there. A `quick` one
+/// takes few steps, for a model that is refined again when more is known.
 pub(crate) fn joint(
     point: Point,
     prepared: &Prepared,
     options: &RefineOptions,
     hopeless: f64,
+    quick: bool,
     progress: Progress,
 ) -> Result<Refined, Error> {
     /// Steps in which a fit has to show that it is worth more.
@@ -178,6 +180,7 @@ pub(crate) fn joint(
     /// Steps, accepted or not; fewer where one takes long, so that all take about a minute at most.
     const STEPS: std::ops::RangeInclusive<usize> = 40..=300;
     const PRODUCTS: f64 = 4e11;
+    const QUICK: usize = 40;
     /// Passes of Huber's loss, each with the scale that the one before found.
     const PASSES: usize = 3;
     let record = &prepared.record;
@@ -190,6 +193,9 @@ pub(crate) fn joint(
     let needed = Layout::new(&point, settings.freedom).len;
     let products = prepared.values() * (needed * needed) as f64;
     settings.steps = ((PRODUCTS / products) as usize).clamp(*STEPS.start(), *STEPS.end());
+    if quick {
+        settings.steps = settings.steps.min(QUICK);
+    }
     if record.scored() * record.outputs().len() < needed {
         let purpose = "all parameters of the refinement".to_owned();
         return Err(Error::TooFewSamples { samples: record.scored(), needed, purpose });
@@ -208,7 +214,10 @@ pub(crate) fn joint(
         (point, history) = (fitted.point, fitted.history);
     }
     let mut fitted = fit(point, record, &settings, "refinement", progress)?.after(&history);
-    while let Some(better) = revived(&fitted, prepared, &settings, progress)? {
+    /// Products of a quick fit beyond which idle plays are not tried elsewhere.
+    const QUICK_PRODUCTS: f64 = 1e10;
+    let revives = !quick || products * (settings.steps as f64) < QUICK_PRODUCTS;
+    while revives && let Some(better) = revived(&fitted, prepared, &settings, progress)? {
         fitted = better;
     }
     /// One or two samples that stand apart do not pull a fit.

@@ -1,0 +1,168 @@
+"""`gpi explain`: what a record's model lacks, and the error before and after."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+import gpi_hammerstein._native as native
+from gpi_hammerstein import files
+from gpi_hammerstein._native import Explanation, ParameterError
+from gpi_hammerstein.cli import options
+from gpi_hammerstein.cli.output import (
+    common_unit,
+    console,
+    describe_record,
+    error_table,
+    picture,
+    print_json,
+    progress_bar,
+    say_written,
+    working,
+    write_json,
+)
+from gpi_hammerstein.explanation import in_words, to_dict
+
+MODEL = "Model"
+
+
+def explain(
+    records: options.Records,
+    input: options.Input = None,
+    output: options.Output = None,
+    time: options.Time = None,
+    rate: options.Rate = None,
+    covariate: options.Covariate = None,
+    resample: options.Resample = None,
+    warmup: options.Warmup = None,
+    experiments: options.Experiments = None,
+    holdout_record: Annotated[
+        Path | None,
+        typer.Option(help="Another experiment of the same actuator to test on.", metavar="FILE"),
+    ] = None,
+    effects: Annotated[
+        str | None,
+        typer.Option(
+            help="Effects that may be added, joined by commas; all unless given, `none` for none.",
+            metavar="A,B",
+        ),
+    ] = None,
+    order: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="States of the linear part; more are then an effect.", rich_help_panel=MODEL
+        ),
+    ] = None,
+    half_widths: Annotated[
+        str | None,
+        typer.Option(help="Number of plays, or half-widths.", rich_help_panel=MODEL, metavar="N|R1,R2,.."),
+    ] = None,
+    thresholds: Annotated[
+        str | None,
+        typer.Option(help="Number of deadzones, or thresholds.", rich_help_panel=MODEL, metavar="N|H1,H2,.."),
+    ] = None,
+    delay: Annotated[
+        int | None,
+        typer.Option(min=0, help="Makes G a gain with this delay, in samples.", rich_help_panel=MODEL),
+    ] = None,
+    reading: Annotated[
+        Literal["one-sided", "directional"],
+        typer.Option(help="Deadzones: of u alone, or of its direction too.", rich_help_panel=MODEL),
+    ] = "one-sided",
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> int:
+    """Find out what a record's model lacks, add it, and report the error before and after.
+
+    Effects are confirmed on blocks of the record that take no part in any fit. Ctrl-C ends the search and
+    keeps what was found. Writes model.json, explanation.json and pictures to DIR.
+    """
+    read: dict[str, Any] = {
+        "input": input,
+        "output": output,
+        "time": time,
+        "rate": rate,
+        "covariate": covariate,
+        "resample": resample,
+        "warmup": warmup,
+    }
+    recording = options.read(records, **read, experiments=experiments)
+    if holdout_record is not None and holdout_record.suffix == ".npy":
+        raise ParameterError(
+            f"`holdout-record` = {holdout_record}: a .npy file has no output of its own; use .npz"
+        )
+    other = None if holdout_record is None else options.read([holdout_record], **read).record()
+    record = recording.record()
+    with progress_bar() as progress:
+        found = native.explain(
+            record,
+            other,
+            effects=split_effects(effects),
+            order=order,
+            half_widths=options.parse_numbers("half_widths", half_widths),
+            thresholds=options.parse_numbers("thresholds", thresholds),
+            delay=delay,
+            reading=reading,
+            progress=progress,
+        )
+    result = to_dict(found)
+    result["record"] = describe_record(recording, records)
+    where = "blocks of time spread over the record" if other is None else f"another record: {holdout_record}"
+    result |= {"holdout": where, "files": []}
+    if out is not None:
+        with files.staged(out) as folder, working("drawing"):
+            write_pictures(folder, found)
+            files.save_model(found.model, folder / "model.json")
+            result["files"] = sorted([*(file.name for file in folder.iterdir()), "explanation.json"])
+            write_json(result, folder / "explanation.json")
+    if as_json:
+        print_json(result)
+    else:
+        summarise(console(), result, common_unit(record), out)
+    return 130 if found.interrupted else 0
+
+
+def split_effects(text: str | None) -> list[str] | None:
+    """Read names joined by commas; ``none`` is an empty list."""
+    if text is None:
+        return None
+    return [name.strip() for name in text.split(",") if name.strip() not in ("", "none")]
+
+
+def summarise(screen: Console, result: dict[str, Any], unit: str, out: Path | None) -> None:
+    """Print what was found for people to read."""
+    record = result["record"]
+    screen.print(
+        f"{record['samples']} samples at {record['rate_hz']:g} Hz in {record['experiments']} experiment(s): "
+        + escape(f"{', '.join(record['inputs'])} -> {', '.join(record['outputs'])}")
+    )
+    for note in record["notes"]:
+        screen.print(f"[yellow]note[/] {escape(note)}")
+    if result["interrupted"]:
+        screen.print("[yellow]note[/] stopped before the search had finished; this is what was found so far")
+    screen.print(f"Held out: {escape(result['holdout'])}")
+    before, after = result["error"]["before"], result["error"]["after"]
+    rows = {
+        "before, fitted": before["train"],
+        "before, held out": before["holdout"],
+        "after, fitted": after["train"],
+        "after, held out": after["holdout"],
+    }
+    screen.print(error_table(rows, unit))
+    for sentence in in_words(result, unit):
+        screen.print(escape(sentence))
+    if result["next_experiment"] and result["next_experiment"]["command"]:
+        screen.print(f"  {escape(result['next_experiment']['command'])}")
+    say_written(screen, out, result["files"])
+
+
+def write_pictures(folder: Path, found: Explanation) -> None:
+    """Draw the residual before and after, in time, over frequency and against u, and the loop."""
+    from gpi_hammerstein.plot import explanation as draw
+
+    picture(folder / "residual_time.png", lambda ax: draw.residual_in_time(found, ax), 10.0)
+    picture(folder / "residual_spectrum.png", lambda ax: draw.residual_spectrum(found, ax))
+    picture(folder / "residual_over_input.png", lambda ax: draw.residual_over_input(found, ax))
+    picture(folder / "loop.png", lambda ax: draw.loops(found, ax), 6.0, 6.0)

@@ -1,0 +1,137 @@
+"""An explanation as the JSON object `gpi-explanation/1`, and in words."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from gpi_hammerstein._native import Explanation, effect_names
+
+__all__ = ["in_words", "to_dict"]
+
+
+def to_dict(found: Explanation) -> dict[str, Any]:
+    """Return an explanation as the JSON object `gpi-explanation/1`.
+
+    Parameters
+    ----------
+    found
+        What `explain` returned.
+
+    Returns
+    -------
+    dict
+        ``schema``, ``record``, ``noise_floor``, ``effects``, ``steps``, ``rejected``, ``error`` (before and
+        after, each train and holdout), ``residual`` (whether it is structured, and its tests), ``verdict``,
+        ``next_experiment``, ``interrupted``.
+
+    Examples
+    --------
+    >>> to_dict(gpi.explain(record))["verdict"]  # doctest: +SKIP
+    'explained'
+    """
+    record, floor = found.record, found.noise_floor
+    noise = float(np.sqrt(np.mean(np.square(floor["rms"]))))
+    keys = ("name", "output", "statistic", "threshold", "p_value", "passed", "points_to")
+    return {
+        "schema": "gpi-explanation/1",
+        "record": {
+            "samples": record.samples,
+            "rate_hz": record.rate,
+            "inputs": record.input_names,
+            "outputs": record.output_names,
+            "covariates": record.covariate_names,
+        },
+        "noise_floor": {**floor, "rms": noise, "per_output": floor["rms"]},
+        "effects": found.effects,
+        "steps": [
+            {
+                **step,
+                "parameters": {
+                    row["name"]: {key: row[key] for key in ("value", "std", "unit")}
+                    for row in step["parameters"]
+                },
+            }
+            for step in found.steps
+        ],
+        "rejected": found.rejected,
+        "error": {"before": found.before, "after": found.after},
+        "residual": {
+            "structured": found.verdict != "explained",
+            "tests": [{key: test[key] for key in keys} for test in found.tests],
+        },
+        "verdict": found.verdict,
+        "next_experiment": found.next_experiment,
+        "interrupted": found.interrupted,
+    }
+
+
+def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
+    """Yield sentences that say what an explanation found.
+
+    Parameters
+    ----------
+    result
+        What `to_dict` returned.
+    unit
+        The unit of the outputs.
+
+    Yields
+    ------
+    str
+        One sentence at a time: what was missing, how sure, what is left, what to measure next.
+
+    Examples
+    --------
+    >>> for sentence in in_words(to_dict(found), "um"):  # doctest: +SKIP
+    ...     print(sentence)
+    """
+    space = f" {unit}" if unit else ""
+    before, after = (result["error"][when]["holdout"]["rms"] for when in ("before", "after"))
+    names = effect_names()
+    if not result["effects"]:
+        yield "No effect of the catalogue is missing from the model beyond chance."
+    else:
+        yield (
+            f"The model lacked {join(result['effects'])}: on data that took no part in the fit the error "
+            f"falls from {before:.4g}{space} to {after:.4g}{space} rms "
+            f"({before / max(after, 1e-300):.3g} times)."
+        )
+    shown: set[str] = set()
+    for step in result["steps"]:
+        name = step["effect"]
+        if name is None or not step["parameters"] or name in shown:
+            continue
+        shown.add(name)
+        numbers = ", ".join(number(label, row) for label, row in list(step["parameters"].items())[:6])
+        yield f"{name} ({names[name]}): {numbers}."
+    for other in result["rejected"]:
+        if other["confounded_with"]:
+            yield f"{other['effect']} {other['why']}: this record cannot tell them apart."
+    floor = result["noise_floor"]["rms"]
+    left = result["error"]["after"]["train"]["rms"]
+    yield f"What is left is {left:.4g}{space} rms; the noise floor is {floor:.4g}{space}."
+    failed = [test for test in result["residual"]["tests"] if not test["passed"]]
+    for test in failed:
+        yield (
+            f"It fails the test {test['name']} ({test['statistic']:.3g} over {test['threshold']:.3g}), which "
+            f"points to {test['points_to']}."
+        )
+    yield {
+        "explained": "Verdict: explained; the residual shows no more than noise.",
+        "partly-explained": "Verdict: partly explained; structure is left in the residual.",
+        "unattributed": "Verdict: unattributed; the residual has structure that no effect explains.",
+    }[result["verdict"]]
+    if result["next_experiment"]:
+        yield f"Next: {result['next_experiment']['why']}."
+
+
+def number(label: str, row: Mapping[str, Any]) -> str:
+    """Return a parameter with its uncertainty and unit."""
+    spread = f" ± {1.96 * row['std']:.2g}" if row["std"] else ""
+    return f"{label} {row['value']:.4g}{spread}" + (f" {row['unit']}" if row["unit"] else "")
+
+
+def join(names: list[str]) -> str:
+    """Return names as a list in a sentence."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
