@@ -137,7 +137,7 @@ pub fn explain(
     let identify = usual_grids(&options.identify, &training);
     // Spikes that stand out of the output itself.
     let outputs: Vec<Matrix> = training.experiments().iter().map(|e| e.output.clone()).collect();
-    let spikes = crate::identify::outliers::places(&outputs, &search::everything(&training)?);
+    let spikes = crate::identify::outliers::places(&outputs, &search::everything(&training)?, 0);
     let training = search::repaired(&training, &outputs, &spikes)?;
     let mut prepared = prepare(&training, &identify)?;
     let measured = as_measured(&prepared.record, record, &prepared.means)?;

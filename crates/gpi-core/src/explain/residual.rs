@@ -336,7 +336,7 @@ fn independence(
 }
 
 fn wrong_samples(beside: &Beside, output: usize) -> ResidualTest {
-    let places = outliers::places(beside.residuals, beside.record);
+    let places = outliers::places(beside.residuals, beside.record, 0);
     let count: usize = places.iter().map(|experiment| experiment[output].len()).sum();
     let expected = 2e-9 * beside.record.scored() as f64;
     ResidualTest {

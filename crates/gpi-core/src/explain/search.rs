@@ -369,7 +369,7 @@ impl<'a> Search<'a> {
     /// is known.
     pub(crate) fn repair(&mut self) -> Result<(), Error> {
         let residuals = self.point.residuals(&self.measured)?;
-        self.wrong = outliers::places(&residuals, &everything(&self.measured)?);
+        self.wrong = outliers::places(&residuals, &everything(&self.measured)?, 0);
         self.prepared.record = repaired(&self.measured, &residuals, &self.wrong)?;
         Ok(())
     }

@@ -28,19 +28,20 @@ pub(crate) fn deviations(residuals: &[Matrix], record: &Record) -> Vec<f64> {
 
 /// How many scored samples of a residual are isolated outliers, see [`places`].
 pub(crate) fn count(residuals: &[Matrix], record: &Record) -> usize {
-    places(residuals, record).iter().flatten().map(Vec::len).sum()
+    /// Outliers may stand close together.
+    const NEAR: usize = 2;
+    places(residuals, record, NEAR).iter().flatten().map(Vec::len).sum()
 }
 
 /// The scored samples of signals (samples, outputs) that stand apart, `[experiment][output]`.
 ///
 /// A sample stands apart when it differs from the median of its four neighbours by more than six robust
 /// standard deviations of such differences, and by four times more than the samples a little further away
-/// (but for two, which may be wrong themselves): slow or structured signals have none, however rough.
-pub(crate) fn places(signals: &[Matrix], record: &Record) -> Vec<Vec<Vec<usize>>> {
+/// (but for `near` of them, which may be wrong themselves): slow or structured signals have none, however
+/// rough, and the fewer the smaller `near` is.
+pub(crate) fn places(signals: &[Matrix], record: &Record, near: usize) -> Vec<Vec<Vec<usize>>> {
     const APART: f64 = 6.0;
     const ALONE: f64 = 4.0;
-    /// Outliers that may be near.
-    const OTHERS: usize = 2;
     /// Of the samples around; the nearest two have this one among their neighbours.
     const AROUND: std::ops::RangeInclusive<usize> = 3..=12;
     let mut found = vec![vec![Vec::new(); record.outputs().len()]; signals.len()];
@@ -64,7 +65,7 @@ pub(crate) fn places(signals: &[Matrix], record: &Record) -> Vec<Vec<Vec<usize>>
                     .flat_map(|lag| [size(k.checked_sub(lag)), size(Some(k + lag))])
                     .collect();
                 around.sort_by(|a, b| b.total_cmp(a));
-                own > ALONE * around[OTHERS]
+                own > ALONE * around[near]
             };
             found[index][output] = experiment.scored_runs().flatten().filter(alone).collect();
         }
