@@ -25,7 +25,9 @@ def explained(seed, effects, strength, **options):
 # Strong enough that the record decides: how much of an effect the declared model can take for itself
 # differs, and with it what is left to be seen.
 def not_yet(name, strength, why):
-    return pytest.param(name, strength, marks=pytest.mark.xfail(reason=why))
+    return pytest.param(
+        name, strength, marks=[pytest.mark.unmet, pytest.mark.xfail(reason=why, strict=False)]
+    )
 
 
 CASES = [
