@@ -91,6 +91,12 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
     names = effect_names()
     if not result["effects"]:
         yield "No effect of the catalogue is missing from the model beyond chance."
+    elif after >= before:
+        yield (
+            f"The model lacked {join(result['effects'])}. On the held-out record the error goes from "
+            f"{before:.4g}{space} to {after:.4g}{space} rms: effects that the input does not drive are others "
+            "there and are left out."
+        )
     else:
         yield (
             f"The model lacked {join(result['effects'])}: on data that took no part in the fit the error "
