@@ -94,8 +94,8 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
     elif after >= before:
         yield (
             f"The model lacked {join(result['effects'])}. On the held-out record the error goes from "
-            f"{before:.4g}{space} to {after:.4g}{space} rms: effects that the input does not drive are others "
-            "there and are left out."
+            f"{before:.4g}{space} to {after:.4g}{space} rms: effects that the input does not drive are "
+            "others there and are left out."
         )
     else:
         yield (
