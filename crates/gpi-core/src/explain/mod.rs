@@ -145,7 +145,13 @@ pub fn explain(
     refined.drop_undetermined(&prepared, progress)?;
     let base = refined.fitted.point.clone();
     let order_is_given = identify.order.is_some() || identify.delay.is_some();
-    let mut search = Search::new(prepared, &refined, allowed, order_is_given, measured)?;
+    let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_)));
+    let moving = RefineOptions {
+        thresholds: !given(&identify.thresholds),
+        half_widths: !given(&identify.half_widths),
+        ..RefineOptions::default()
+    };
+    let mut search = Search::new(prepared, &refined, allowed, order_is_given, measured, moving)?;
     search.repair()?;
     let interrupted = match search.run(progress) {
         Err(Error::Interrupted) => true,
@@ -153,7 +159,7 @@ pub fn explain(
     };
     let mut patient = |_: &str, _: f64| true;
     let last: Progress = if interrupted { &mut patient } else { progress };
-    let refinement = finish(&mut search, &identify, interrupted, last)?;
+    let refinement = finish(&mut search, interrupted, last)?;
     summarise(record, holdout, &base, search, refinement, interrupted)
 }
 
@@ -183,20 +189,10 @@ fn as_measured(prepared: &Record, given: &Record, means: &[f64]) -> Result<Recor
 }
 
 /// Refines everything once more, grids that were not given included, and works out how sure it is.
-fn finish(
-    search: &mut Search,
-    identify: &IdentifyOptions,
-    interrupted: bool,
-    progress: Progress,
-) -> Result<Refinement, Error> {
+fn finish(search: &mut Search, interrupted: bool, progress: Progress) -> Result<Refinement, Error> {
     const STEPS: usize = 25;
-    let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_)));
-    let free = RefineOptions {
-        thresholds: !given(&identify.thresholds),
-        half_widths: !given(&identify.half_widths),
-        ..RefineOptions::default()
-    };
-    let mut options = settings(&search.prepared, &free, if interrupted { 1 } else { STEPS });
+    let mut options =
+        settings(&search.prepared, &search.moving, if interrupted { 1 } else { STEPS });
     options.weighting.outputs.clone_from(&search.options.weighting.outputs);
     let fitted =
         fit(search.point.clone(), &search.prepared.record, &options, "refinement", progress)?;

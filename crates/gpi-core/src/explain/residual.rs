@@ -15,7 +15,8 @@ pub struct ResidualTest {
     pub output: usize,
     /// What is compared with the threshold.
     pub statistic: f64,
-    /// What a residual without structure stays below, all tests taken together, 99 times in 100.
+    /// What the statistic must not exceed: for whiteness the value of chance a hundredth over the number of
+    /// tests, or a hundredth of the variance if that is more; four standard errors for a dependence.
     pub threshold: f64,
     /// The chance that a residual without structure gives a statistic this large or larger.
     pub p_value: f64,

@@ -61,6 +61,8 @@ pub(crate) struct Search<'a> {
     pub allowed: Vec<&'static Entry>,
     /// Whether a mode that G lacks is an effect; else it is an order that G was not given.
     pub order_is_given: bool,
+    /// Which grids may move and become finer.
+    pub moving: RefineOptions,
     /// Which of `GRIDS` the model has.
     grid: usize,
     /// Whether a finer grid was tried since the latest effect.
@@ -82,6 +84,7 @@ impl<'a> Search<'a> {
         allowed: Vec<&'static Entry>,
         order_is_given: bool,
         measured: Record,
+        moving: RefineOptions,
     ) -> Result<Self, Error> {
         /// Levenberg-Marquardt steps of a trial.
         const STEPS: usize = 12;
@@ -94,6 +97,7 @@ impl<'a> Search<'a> {
             options,
             allowed,
             order_is_given,
+            moving,
             grid: 0,
             is_rich: false,
             point: refined.fitted.point.clone(),
@@ -191,15 +195,19 @@ impl<'a> Search<'a> {
     /// The present point with as many plays and deadzones an input, where they pay.
     fn with_grid(&self, grid: (usize, usize), progress: Progress) -> Result<(Point, f64), Error> {
         const STEPS: usize = 15;
-        let free =
-            RefineOptions { thresholds: true, half_widths: true, ..RefineOptions::default() };
-        let mut options = settings(&self.prepared, &free, STEPS);
+        let mut options = settings(&self.prepared, &self.moving, STEPS);
         options.weighting = self.options.weighting.clone();
         options.gain = 1e-4;
         let record = &self.prepared.record;
         let spans = self.prepared.spans(&self.point);
         let widest: Vec<f64> = spans.iter().map(|span| 0.5 * span).collect();
         let mut point = self.point.clone();
+        let (plays, deadzones) = grid;
+        // what the user gives by value stays
+        let grid = (
+            if self.moving.half_widths { plays } else { 0 },
+            if self.moving.thresholds { deadzones } else { 0 },
+        );
         point.fill_gaps(grid, &widest, &[-0.5, 0.0, 0.5], record);
         let mut fitted = fit(point, record, &options, "refinement", progress)?;
         if fitted.point.drop_unused() {
@@ -283,11 +291,16 @@ impl<'a> Search<'a> {
 
     /// Sum of squares of every held-out block.
     fn held_out(&self, point: &Point) -> Result<Vec<f64>, Error> {
+        self.squares(point, &self.test)
+    }
+
+    /// Sum of squares of every run that `scored` scores.
+    fn squares(&self, point: &Point, scored: &Record) -> Result<Vec<f64>, Error> {
         // run over the training record, whose starts were fitted
         let residuals = point.residuals(&self.prepared.record)?;
         let weights = &self.options.weighting.outputs;
         let mut sums = Vec::new();
-        for (residual, experiment) in residuals.iter().zip(self.test.experiments()) {
+        for (residual, experiment) in residuals.iter().zip(scored.experiments()) {
             for run in experiment.scored_rows(residual) {
                 let columns = run.column_iter().zip(weights);
                 sums.push(columns.map(|(c, w)| w * w * c.norm_squared()).sum());
@@ -371,6 +384,8 @@ impl<'a> Search<'a> {
         let residuals = self.point.residuals(&self.measured)?;
         self.wrong = outliers::places(&residuals, &everything(&self.measured)?, 0);
         self.prepared.record = repaired(&self.measured, &residuals, &self.wrong)?;
+        // what the next fits are compared with
+        self.cost = self.squares(&self.point, &self.prepared.record)?.iter().sum();
         Ok(())
     }
 }
