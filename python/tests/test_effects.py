@@ -55,7 +55,17 @@ def with_effect(model, **effect):
 
 
 def chain(
-    u, own=None, delay=0, drive=None, width=None, read=None, beside=None, feedback=None, sense=None, add=None
+    u,
+    own=None,
+    delay=0,
+    drive=None,
+    width=None,
+    speed_seen=None,
+    read=None,
+    beside=None,
+    feedback=None,
+    sense=None,
+    add=None,
 ):
     """The declared chain sample by sample, with what an effect does at its place."""
     own = own or plant(delay)
@@ -63,6 +73,7 @@ def chain(
     u = u if drive is None else drive(u)
     z = oracle.deadzones(u, channel.thresholds, channel.deadzone_weights)
     speed = np.abs(np.diff(u, prepend=u[0])) * RATE
+    speed = speed if speed_seen is None else speed_seen(speed)
     places = np.zeros(len(channel.half_widths))
     v = np.zeros(len(u))
     for k in range(len(u)):
@@ -136,6 +147,21 @@ def gap(half_width):
     return sense
 
 
+def bent(speed):
+    """Box and Cox's law with exponent 0.3 and knee 40, behind a lag of 4 ms."""
+    out, state, keep = np.zeros(len(speed)), 0.0, np.exp(-1 / (4e-3 * RATE))
+    for k in range(len(speed)):
+        state = keep * state + (1 - keep) * speed[k]
+        out[k] = 40 * ((1 + state / 40) ** 0.3 - 1) / 0.3
+    return out
+
+
+def parabola(t, values):
+    """Through values at 0, 0.2 and 0.4 s: what a smooth curve through three knots is; then constant."""
+    return np.polyval(np.polyfit([0, 0.2, 0.4], values, 2), np.minimum(t, 0.4))
+
+
+LAW = {"exponent": 0.3, "knee": 40.0, "lag": 4e-3}
 DRIVES2, DRIVES3 = np.array([0.002, -0.001, 0.003]), np.array([-0.004, 0.002, 0.001])
 CURVES = np.array([[0.02, -0.1, 0.05, 0.01], [0.03, 0.02, -0.04, 0.02]])
 
@@ -149,8 +175,8 @@ CASES = {
     "delay": ({"input": 0, "samples": 2.3}, {"drive": late(2.3)}),
     "amplifier-slew": ({"input": 0, "limit": 60.0}, {"drive": slew(60.0)}),
     "rate-dependence": (
-        {"input": 0, "relative": 2e-3, "absolute": 5e-4, "speed": 100.0, "widest": 1.3},
-        {"width": lambda r, s: r * (1 + 2e-3 * s) + (5e-4 * s if r > 0 else 0)},
+        {"input": 0, "relative": 2e-3, "absolute": 5e-4, "law": LAW, "speed": 100.0, "widest": 1.3},
+        {"width": lambda r, s: r * (1 + 2e-3 * s) + (5e-4 * s if r > 0 else 0), "speed_seen": bent},
     ),
     "hysteresis-shape": (
         {"input": 0, "coefficients": CURVES.ravel().tolist(), "scale": 2.5, "widest": 1.3},
@@ -174,12 +200,12 @@ CASES = {
     ),
     "gain-drift": (
         {"output": 0, "changes": [0.1, -0.2], "duration": 0.4},
-        {"sense": lambda x: x * (1 + np.interp(np.arange(len(x)) / RATE, [0, 0.2, 0.4], [0, 0.1, -0.2]))},
+        {"sense": lambda x: x * (1 + parabola(np.arange(len(x)) / RATE, [0, 0.1, -0.2]))},
     ),
     "backlash": ({"output": 0, "half_width": 0.2}, {"sense": gap(0.2)}),
     "drift": (
         {"output": 0, "changes": [0.5, 0.2], "duration": 0.4, "span": 4.0},
-        {"add": lambda t: np.interp(t, [0, 0.2, 0.4], [0, 0.5, 0.2])},
+        {"add": lambda t: parabola(t, [0, 0.5, 0.2])},
     ),
     "periodic-disturbance": (
         {"output": 0, "frequency": 50.0, "cosine": 0.3, "sine": -0.2, "duration": 0.6, "span": 4.0},

@@ -85,6 +85,7 @@ impl Model {
             let block = effect.block();
             match block.stage() {
                 Stage::Input => block.rest(input[block.channel()], self.moment(0, &[])),
+                Stage::Plays => block.rest(0.0, self.moment(0, &[])),
                 Stage::Dynamics => standing(block, v, self.rate()),
                 // the first sample tells
                 _ => Vec::new(),
@@ -119,14 +120,18 @@ impl Model {
         &self,
         input: usize,
         state: &mut GpiState<f64, Vec<f64>>,
+        memories: &mut [Vec<f64>],
         signal: &mut [f64],
     ) -> Result<(), Error> {
         let hysteresis = &self.hysteresis()[input];
-        let blocks: Vec<&dyn Block> = self
+        let acts = |block: &dyn Block| block.stage() == Stage::Plays && block.channel() == input;
+        let mut blocks: Vec<(&dyn Block, &mut Vec<f64>, f64)> = self
             .effects
             .iter()
             .map(Effect::block)
-            .filter(|block| block.stage() == Stage::Plays && block.channel() == input)
+            .zip(memories)
+            .filter(|(block, _)| acts(*block))
+            .map(|(block, memory)| (block, memory, 0.0))
             .collect();
         if blocks.is_empty() {
             hysteresis.in_place(state, signal);
@@ -136,13 +141,18 @@ impl Model {
         let mut places = state.plays.plays().to_vec();
         for value in signal {
             let speed = (*value - state.envelope.previous).abs() * self.rate();
+            for (block, memory, speed_seen) in &mut blocks {
+                *speed_seen = block.speed_seen(memory, speed, self.rate());
+            }
             let z = envelope.step(&mut state.envelope, *value);
             *value = 0.0;
             let plays = bank.half_widths().iter().zip(bank.weights()).zip(&mut places);
             for ((&r, weight), place) in plays {
-                let width = blocks.iter().fold(r, |width, block| block.width(width, speed).0);
+                let width = blocks
+                    .iter()
+                    .fold(r, |width, (block, _, speed_seen)| block.width(width, *speed_seen).0);
                 *place = play(width, z, *place);
-                let read = blocks.iter().fold(*place, |place, block| block.read(r, place).0);
+                let read = blocks.iter().fold(*place, |place, (block, ..)| block.read(r, place).0);
                 *value += weight * read;
             }
         }

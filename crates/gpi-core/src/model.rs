@@ -152,15 +152,16 @@ impl Model {
     }
 
     /// The intermediate signals v (samples, inputs) of a drive (samples, inputs) that has passed the
-    /// input stage; `states` move on.
+    /// input stage; what `state` knows of the hysteresis moves on.
     ///
     /// # Errors
     /// Another number of channels or states than inputs.
     pub fn intermediate_from(
         &self,
-        states: &mut [GpiState<f64, Vec<f64>>],
+        state: &mut ModelState,
         input: &Matrix,
     ) -> Result<Matrix, Error> {
+        let ModelState { hysteresis: states, effects: memories, .. } = state;
         let inputs = self.hysteresis.len();
         Error::require_equal("channels", ("input", input.ncols()), ("hysteresis", inputs))?;
         Error::require_equal("channels", ("state", states.len()), ("hysteresis", inputs))?;
@@ -168,7 +169,7 @@ impl Model {
         let samples = input.nrows();
         let columns = v.as_mut_slice().chunks_exact_mut(samples.max(1));
         for ((place, state), column) in states.iter_mut().enumerate().zip(columns) {
-            self.play_from(place, state, column)?;
+            self.play_from(place, state, memories, column)?;
         }
         Ok(v)
     }
@@ -198,7 +199,7 @@ impl Model {
         let rows = ("covariates", covariates.nrows());
         Error::require_equal("samples", ("input", samples), rows)?;
         let drive = self.drive_from(state, input);
-        let v = self.intermediate_from(&mut state.hysteresis, &drive)?;
+        let v = self.intermediate_from(state, &drive)?;
         let mut output = self.respond_from(state, &v)?;
         if samples > 0 {
             self.read_from(state, &mut output, covariates);
@@ -234,7 +235,7 @@ impl Model {
     pub fn intermediate(&self, input: &Matrix) -> Result<Matrix, Error> {
         let mut state = self.start_of(input)?;
         let drive = self.drive_from(&mut state, input);
-        self.intermediate_from(&mut state.hysteresis, &drive)
+        self.intermediate_from(&mut state, &drive)
     }
 
     fn start_of(&self, input: &Matrix) -> Result<ModelState, Error> {

@@ -127,9 +127,15 @@ pub trait Block {
         input
     }
 
-    /// Plays: the half-width of a play at a speed `|du/dt|`, and its derivative by `half_width`.
-    fn width(&self, half_width: f64, speed: f64) -> (f64, f64) {
-        let _ = speed;
+    /// Plays: what half-widths grow with at a speed `|du/dt|`, the sampling rate in Hz.
+    fn speed_seen(&self, state: &mut [f64], speed: f64, rate: f64) -> f64 {
+        let _ = (state, rate);
+        speed
+    }
+
+    /// Plays: the half-width of a play at that [`Block::speed_seen`], and its derivative by `half_width`.
+    fn width(&self, half_width: f64, speed_seen: f64) -> (f64, f64) {
+        let _ = speed_seen;
         (half_width, 1.0)
     }
 

@@ -29,7 +29,7 @@ impl Drift {
             let (changes, span) = (vec![0.0; knots - 1], situation.span(output));
             Candidate::linear(Self { output, changes, duration, span }, 0..knots - 1)
         };
-        let blocks = |output| [2, 3, 5, 9, 17].map(|knots| block(output, knots));
+        let blocks = |output| [2, 3, 5, 9, 17, 33].map(|knots| block(output, knots));
         situation.outputs().flat_map(blocks).collect()
     }
 }
@@ -68,8 +68,6 @@ impl Block for Drift {
     }
 
     fn add(&self, _: &mut [f64], moment: Moment) -> f64 {
-        let mut values = vec![0.0];
-        values.extend(&self.changes);
-        knots::at(&values, self.duration, moment.time)
+        knots::at(&self.changes, self.duration, moment.time)
     }
 }

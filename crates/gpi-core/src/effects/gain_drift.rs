@@ -2,7 +2,7 @@
 
 use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units, knots};
 
-/// `y = x (1 + g(t))`, g a slow function of time: straight lines between evenly spaced knots, the first
+/// `y = x (1 + g(t))`, g a slow function of time: a smooth curve through evenly spaced knots, the first
 /// of which is 0 (the gain at the start is the model's).
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GainDrift {
@@ -27,14 +27,12 @@ impl GainDrift {
             let block = Self { output, changes: vec![0.0; knots - 1], duration };
             Candidate::linear(block, 0..knots - 1)
         };
-        let blocks = |output| [2, 3, 5, 9].map(|knots| block(output, knots));
+        let blocks = |output| [2, 3, 5, 9, 17, 33].map(|knots| block(output, knots));
         situation.outputs().flat_map(blocks).collect()
     }
 
     fn gain(&self, time: f64) -> f64 {
-        let mut values = vec![0.0];
-        values.extend(&self.changes);
-        1.0 + knots::at(&values, self.duration, time)
+        1.0 + knots::at(&self.changes, self.duration, time)
     }
 }
 

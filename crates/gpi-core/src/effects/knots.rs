@@ -1,15 +1,35 @@
-//! A slow function of time: straight lines between evenly spaced knots.
+//! A slow function of time: a smooth curve through evenly spaced knots.
 
-/// The value at `time` of a function given at knots from 0 to `duration`; constant beyond.
-pub(super) fn at(knots: &[f64], duration: f64, time: f64) -> f64 {
-    let last = knots.len() - 1;
+/// The value at `time` of a function that is 0 at time 0 and has these values at evenly spaced later knots,
+/// the last of them at `duration`; constant beyond.
+///
+/// Between knots runs Catmull and Rom's cubic, whose slope at a knot is that from its neighbour to its
+/// neighbour: linear in the values, and as smooth as what heats up or wears. Beyond the ends a parabola
+/// goes on, or the line where there are two knots alone.
+pub(super) fn at(later: &[f64], duration: f64, time: f64) -> f64 {
+    let last = later.len();
     if last == 0 || duration <= 0.0 {
-        return knots[0];
+        return 0.0;
     }
+    let value = |i: usize| if i == 0 { 0.0 } else { later[i - 1] };
+    let beyond = |end: f64, next: f64, second: Option<f64>| match second {
+        Some(second) => 3.0 * end - 3.0 * next + second,
+        None => 2.0 * end - next,
+    };
     let place = (time / duration).clamp(0.0, 1.0) * last as f64;
     let left = (place as usize).min(last - 1);
-    let right = place - left as f64;
-    (1.0 - right) * knots[left] + right * knots[left + 1]
+    let t = place - left as f64;
+    let (b, c) = (value(left), value(left + 1));
+    let a = match left {
+        0 => beyond(b, c, (last > 1).then(|| value(2))),
+        _ => value(left - 1),
+    };
+    let d = match left + 1 {
+        end if end == last => beyond(c, b, (last > 1).then(|| value(last - 2))),
+        next => value(next + 1),
+    };
+    let bend = [2.0 * a - 5.0 * b + 4.0 * c - d, 3.0 * (b - c) + d - a];
+    b + 0.5 * t * (c - a + t * (bend[0] + t * bend[1]))
 }
 
 #[cfg(test)]
@@ -17,11 +37,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_between_knots() {
-        let knots = [1.0, 3.0, -1.0];
+    fn a_parabola_is_a_parabola_everywhere() {
+        let parabola = |t: f64| 3.0 * t - 0.5 * t * t;
+        let later: Vec<f64> = (1..=6).map(|i| parabola(0.5 * f64::from(i))).collect();
+        for k in 0..=60 {
+            let time = 3.0 * f64::from(k) / 60.0;
+            assert!((at(&later, 3.0, time) - parabola(time)).abs() < 1e-12, "at {time}");
+        }
+        assert!((at(&later, 3.0, 9.0) - parabola(3.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_knots_are_a_line() {
         assert_eq!(
-            [-1.0, 0.0, 0.5, 1.0, 1.5, 9.0].map(|t| at(&knots, 2.0, t)),
-            [1.0, 1.0, 2.0, 3.0, 1.0, -1.0]
+            [-1.0, 0.0, 0.5, 2.0, 9.0].map(|t| at(&[4.0], 2.0, t)),
+            [0.0, 0.0, 1.0, 4.0, 4.0]
         );
     }
 }

@@ -37,7 +37,7 @@ pub use linear_dynamics::LinearDynamics;
 pub use outliers::Outliers;
 pub use output_nonlinearity::OutputNonlinearity;
 pub use periodic_disturbance::PeriodicDisturbance;
-pub use rate_dependence::RateDependence;
+pub use rate_dependence::{RateDependence, SpeedLaw};
 pub use stiffness::Stiffness;
 
 pub(crate) use creep::SHORTEST as SHORTEST_CREEP;

@@ -1,9 +1,12 @@
 //! Half-widths that grow with speed.
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
 
-/// `r(k) = r (1 + a |du/dt|) + b |du/dt|` for every play of half-width r > 0: loops open with speed, in
-/// proportion to the half-width, by the same width, or both.
+/// `r(k) = r (1 + a g(s)) + b g(s)` for every play of half-width r > 0, s the speed |du/dt|: loops open
+/// with speed, in proportion to the half-width, by the same width, or both.
+///
+/// `g(s) = s`, or with a [`SpeedLaw`] `g(s) = s_0 ((1 + s / s_0)^e - 1) / e`, which starts as s and then
+/// grows slower.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RateDependence {
     /// The input whose hysteresis it is.
@@ -12,11 +15,36 @@ pub struct RateDependence {
     pub relative: f64,
     /// b, in seconds.
     pub absolute: f64,
+    /// How g bends; straight without it.
+    pub law: Option<SpeedLaw>,
     /// The speed that brings a or b to bear, in the input's unit per second: where steps are counted
     /// from.
     pub speed: f64,
     /// Half-width of the widest play.
     pub widest: f64,
+}
+
+/// Box and Cox's family of laws: straight for e = 1, a power for e between 0 and 1 beyond a small s_0,
+/// logarithmic for e = 0, and an end at s_0 for e = -1.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct SpeedLaw {
+    /// e.
+    pub exponent: f64,
+    /// s_0, where the law begins to bend, in the input's unit per second.
+    pub knee: f64,
+    /// Time constant in seconds of the first-order lag behind which s is seen.
+    pub lag: f64,
+}
+
+impl SpeedLaw {
+    fn growth(&self, speed: f64) -> f64 {
+        let logarithm = (speed / self.knee).ln_1p();
+        let bent = match self.exponent {
+            0.0 => logarithm,
+            e => (e * logarithm).exp_m1() / e,
+        };
+        self.knee * bent
+    }
 }
 
 impl RateDependence {
@@ -27,22 +55,33 @@ impl RateDependence {
     pub(super) const REPEATS: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+        /// Exponents, and knees over the median speed.
+        const LAWS: [(f64, f64); 4] = [(0.4, 0.03), (0.0, 0.1), (0.0, 1.0), (-1.0, 1.0)];
+        /// Seconds.
+        const LAGS: [f64; 2] = [0.0, 2.5e-3];
         let rate = situation.record.rate();
         let block = |input: usize| {
             let steps = situation.steps(input);
             let squares: f64 = steps.iter().map(|step| step * step).sum();
             let speed = rate * (squares / steps.len().max(1) as f64).sqrt();
+            let usual = rate * steps.get(steps.len() / 2).copied().unwrap_or(0.0);
             let widest = situation.widest[input];
-            Self { input, relative: 0.0, absolute: 0.0, speed, widest }
+            let block = Self { input, relative: 0.0, absolute: 0.0, law: None, speed, widest };
+            (block, usual)
         };
-        let usable = |block: &Self| block.speed > 0.0 && block.widest > 0.0;
-        let blocks = situation.inputs().map(block).filter(usable);
-        blocks
-            .flat_map(|block| {
-                [vec![0], vec![1], vec![0, 1]]
-                    .map(|places| Candidate::linear(block.clone(), places))
-            })
-            .collect()
+        let usable = |(block, usual): &(Self, f64)| *usual > 0.0 && block.widest > 0.0;
+        let mut candidates = Vec::new();
+        for (block, usual) in situation.inputs().map(block).filter(usable) {
+            let straight = [vec![0], vec![1], vec![0, 1]];
+            candidates.extend(straight.map(|places| Candidate::linear(block.clone(), places)));
+            for (exponent, knee) in LAWS {
+                for lag in LAGS {
+                    let law = Some(SpeedLaw { exponent, knee: knee * usual, lag });
+                    candidates.push(Candidate::linear(Self { law, ..block.clone() }, [0, 1]));
+                }
+            }
+        }
+        candidates
     }
 }
 
@@ -60,32 +99,66 @@ impl Block for RateDependence {
     }
 
     fn values(&self) -> Vec<f64> {
-        vec![self.relative, self.absolute]
+        let law = self.law.map(|law| [law.exponent, law.knee.ln(), law.lag]);
+        [self.relative, self.absolute].into_iter().chain(law.into_iter().flatten()).collect()
     }
 
     fn set(&mut self, values: &[f64]) {
         (self.relative, self.absolute) = (values[0], values[1]);
+        if let (Some(law), [exponent, knee, lag]) = (&mut self.law, &values[2..]) {
+            *law = SpeedLaw { exponent: *exponent, knee: knee.exp(), lag: *lag };
+        }
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        let any = (f64::NEG_INFINITY, f64::INFINITY);
+        let knee = self.speed.ln();
+        let law = [(-2.0, 1.0), (knee - 12.0, knee + 5.0), (0.0, 0.05)];
+        let law = self.law.map(|_| law).into_iter().flatten();
+        [any, any].into_iter().chain(law).collect()
     }
 
     fn steps(&self) -> Vec<f64> {
-        vec![1e-4 / self.speed, 1e-4 * self.widest / self.speed]
+        // where the law bends, growth at the usual speed is less than the speed
+        let speed = self.law.map_or(self.speed, |law| law.growth(self.speed));
+        let law = self.law.map(|law| [1e-3, 1e-3, (1e-2 * law.lag).max(1e-5)]);
+        let law = law.into_iter().flatten();
+        [1e-4 / speed, 1e-4 * self.widest / speed].into_iter().chain(law).collect()
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
-        let unit =
+        let inverse =
             if units.input.is_empty() { "s".to_owned() } else { format!("s/{}", units.input) };
-        vec![
-            Quantity::new("relative_growth", unit, self.relative),
+        let per_second = if units.input.is_empty() { "1" } else { units.input };
+        let mut quantities = vec![
+            Quantity::new("relative_growth", inverse, self.relative),
             Quantity::new("absolute_growth", "s", self.absolute),
-        ]
+        ];
+        if let Some(law) = self.law {
+            quantities.push(Quantity::new("exponent", "", law.exponent));
+            quantities.push(Quantity::new("knee", format!("{per_second}/s"), law.knee));
+            quantities.push(Quantity::new("lag", "s", law.lag));
+        }
+        quantities
     }
 
-    fn width(&self, half_width: f64, speed: f64) -> (f64, f64) {
+    fn rest(&self, _: f64, _: Moment) -> Vec<f64> {
+        vec![0.0]
+    }
+
+    fn speed_seen(&self, seen: &mut [f64], speed: f64, rate: f64) -> f64 {
+        let Some(law) = self.law else { return speed };
+        let keep = if law.lag > 0.0 { (-1.0 / (law.lag * rate)).exp() } else { 0.0 };
+        seen[0] = keep * seen[0] + (1.0 - keep) * speed;
+        law.growth(seen[0])
+    }
+
+    fn width(&self, half_width: f64, speed_seen: f64) -> (f64, f64) {
         if half_width == 0.0 {
             return (0.0, 1.0);
         }
-        let factor = 1.0 + self.relative * speed;
-        let width = half_width * factor + self.absolute * speed;
+        let factor = 1.0 + self.relative * speed_seen;
+        let width = half_width * factor + self.absolute * speed_seen;
         // a growth of either sign may be tried, a negative width has no meaning
         if width > 0.0 { (width, factor) } else { (0.0, 0.0) }
     }

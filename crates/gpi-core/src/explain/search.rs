@@ -51,6 +51,9 @@ pub(crate) struct Round {
 /// Plays and deadzones of an input, each as far as they pay.
 const GRIDS: [(usize, usize); 3] = [(20, 9), (28, 13), (36, 17)];
 
+/// An effect that takes a smaller part of the residual's squares is of no use to anyone.
+const LEAST: f64 = 0.04;
+
 pub(crate) struct Search<'a> {
     pub prepared: Prepared<'a>,
     /// The prepared record as it was measured, wrong samples included.
@@ -128,10 +131,16 @@ impl<'a> Search<'a> {
         const FITTED: usize = 4;
         /// Part of the residual's squares.
         const STRONG: f64 = 0.6;
+        /// Where no family promises this much, no fit would reach what an effect has to gain.
+        const HOPELESS: f64 = 0.5 * LEAST;
         let mut ranked = self.ranked(progress)?;
         // A strong candidate is looked at first: the grid would bend to what it explains.
-        let strong = ranked.first().is_some_and(|(_, score)| score.gain > STRONG);
-        if !strong && !self.is_rich && self.enrich(progress)? {
+        let most = ranked.iter().map(|(_, score)| score.gain).fold(0.0, f64::max);
+        if most < HOPELESS {
+            self.last.clear();
+            return Ok(());
+        }
+        if most < STRONG && !self.is_rich && self.enrich(progress)? {
             ranked = self.ranked(progress)?;
         }
         let before = self.held_out(&self.point)?;
@@ -197,7 +206,7 @@ impl<'a> Search<'a> {
         const STEPS: usize = 15;
         let mut options = settings(&self.prepared, &self.moving, STEPS);
         options.weighting = self.options.weighting.clone();
-        options.gain = 1e-4;
+        options.gain = 1e-3;
         let record = &self.prepared.record;
         let spans = self.prepared.spans(&self.point);
         let widest: Vec<f64> = spans.iter().map(|span| 0.5 * span).collect();
@@ -271,16 +280,18 @@ impl<'a> Search<'a> {
         let (cost, values) = (fitted.linearization.cost, self.prepared.values());
         let point = fitted.point.clone();
         let added = fitted.linearization.layout.len.saturating_sub(self.layout_len());
-        let refined = Refined { fitted, options: self.options.clone(), outliers: 0, robust: false };
-        let uncertainty = refined.uncertainty(&self.prepared, progress)?;
-        let colour = (uncertainty.used / uncertainty.estimated.max(1) as f64).max(1.0);
         /// Candidates that a round looks at: the best of so many must be better than one.
         const LOOKS: f64 = 150.0;
-        /// An effect that takes a smaller part of the residual's squares is of no use to anyone.
-        const LEAST: f64 = 0.04;
-        let chance = colour * (added.max(1) as f64 * values.ln() + 2.0 * LOOKS.ln());
-        let chance = chance.max(LEAST * values);
         let deviance = values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln();
+        let white = added.max(1) as f64 * values.ln() + 2.0 * LOOKS.ln();
+        let mut chance = white.max(LEAST * values);
+        if deviance > chance {
+            let refined =
+                Refined { fitted, options: self.options.clone(), outliers: 0, robust: false };
+            let uncertainty = refined.uncertainty(&self.prepared, progress)?;
+            let colour = uncertainty.used / uncertainty.estimated.max(1) as f64;
+            chance = chance.max(colour * white);
+        }
         let held_out = self.held_out(&point)?;
         Ok(Trial { entry, point, cost, deviance, chance, held_out, promised })
     }

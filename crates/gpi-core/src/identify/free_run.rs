@@ -20,7 +20,7 @@ impl Point {
     /// Effects on the plays of an input.
     pub(crate) fn beside(&self, input: usize) -> Beside<'_> {
         let own = self.at_stage(Stage::Plays).map(Effect::block);
-        Beside { blocks: own.filter(|block| block.channel() == input).collect(), rate: self.rate }
+        Beside::new(own.filter(|block| block.channel() == input), self.rate)
     }
 
     /// The drive (samples, inputs) that reaches the hysteresis.
@@ -47,7 +47,7 @@ impl Point {
         let columns = v.as_mut_slice().chunks_exact_mut(drive.nrows());
         for ((input, channel), column) in self.channels.iter().enumerate().zip(columns) {
             let start = past.plays.as_ref().map(|plays| &plays[input][..]);
-            channel.apply(start, &self.beside(input), column);
+            channel.apply(start, self.beside(input), column);
         }
         v
     }

@@ -1,7 +1,7 @@
 //! The output of one hysteresis and its derivatives, streamed sample by sample.
 
 use crate::Hysteresis;
-use crate::effects::Block;
+use crate::effects::{Block, Moment};
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading, play};
 
 /// Parameters of one hysteresis: `z = sum_j g_j Z_{eta_j}(u)`, then plays.
@@ -76,13 +76,13 @@ impl Parameters {
     }
 
     /// Replaces samples of u by those of v; `start` as in [`Sensitivity::new`].
-    pub(crate) fn apply(&self, start: Option<&[f64]>, beside: &Beside, signal: &mut [f64]) {
+    pub(crate) fn apply(&self, start: Option<&[f64]>, mut beside: Beside, signal: &mut [f64]) {
         let n = self.half_widths.len();
         let (mut plays, mut start) = (vec![0.0; n], start);
         let mut previous = None;
         for value in signal {
             let u = *value;
-            let speed = beside.speed(previous, u);
+            beside.speed_seen(previous, u);
             let z = self.envelope(previous.unwrap_or(0.0), u);
             previous = Some(u);
             if let Some(sides) = start.take() {
@@ -92,7 +92,7 @@ impl Parameters {
             let mut v = 0.0;
             for i in 0..n {
                 let r = self.half_widths[i];
-                plays[i] = play(beside.width(r, speed).0, z, plays[i]);
+                plays[i] = play(beside.width(r).0, z, plays[i]);
                 v += self.weights[i] * beside.read(r, plays[i]).0;
             }
             *value = v;
@@ -103,29 +103,50 @@ impl Parameters {
 /// Effects that act on the plays of one input.
 #[derive(Clone, Default)]
 pub(crate) struct Beside<'a> {
-    pub blocks: Vec<&'a dyn Block>,
+    blocks: Vec<Playing<'a>>,
     /// Sampling rate in Hz.
-    pub rate: f64,
+    rate: f64,
 }
 
-impl Beside<'_> {
-    /// |du/dt|; at the first sample the input stands.
-    fn speed(&self, previous: Option<f64>, u: f64) -> f64 {
-        previous.map_or(0.0, |previous| (u - previous).abs() * self.rate)
+/// An effect, what it remembers, and what half-widths grow with at the present sample.
+#[derive(Clone)]
+struct Playing<'a> {
+    block: &'a dyn Block,
+    memory: Vec<f64>,
+    speed_seen: f64,
+}
+
+impl<'a> Beside<'a> {
+    pub(crate) fn new(blocks: impl Iterator<Item = &'a dyn Block>, rate: f64) -> Self {
+        let still = Moment { time: 0.0, rate, covariates: &[] };
+        let resting = |block: &'a dyn Block| Playing {
+            block,
+            memory: block.rest(0.0, still),
+            speed_seen: 0.0,
+        };
+        Self { blocks: blocks.map(resting).collect(), rate }
+    }
+
+    /// Takes |du/dt| in; at the first sample the input stands.
+    fn speed_seen(&mut self, previous: Option<f64>, u: f64) {
+        let speed = previous.map_or(0.0, |previous| (u - previous).abs() * self.rate);
+        for Playing { block, memory, speed_seen } in &mut self.blocks {
+            *speed_seen = block.speed_seen(memory, speed, self.rate);
+        }
     }
 
     /// A play's half-width, and its derivative by the half-width at rest.
-    fn width(&self, half_width: f64, speed: f64) -> (f64, f64) {
-        self.blocks.iter().fold((half_width, 1.0), |(width, slope), block| {
-            let (width, own) = block.width(width, speed);
+    fn width(&self, half_width: f64) -> (f64, f64) {
+        self.blocks.iter().fold((half_width, 1.0), |(width, slope), playing| {
+            let (width, own) = playing.block.width(width, playing.speed_seen);
             (width, slope * own)
         })
     }
 
     /// What a play's place is read as, and the derivative.
     fn read(&self, half_width: f64, place: f64) -> (f64, f64) {
-        self.blocks.iter().fold((place, 1.0), |(place, slope), block| {
-            let (place, own) = block.read(half_width, place);
+        self.blocks.iter().fold((place, 1.0), |(place, slope), playing| {
+            let (place, own) = playing.block.read(half_width, place);
             (place, slope * own)
         })
     }
@@ -182,7 +203,7 @@ impl<'a> Sensitivity<'a> {
         Self {
             parameters,
             wanted,
-            curved: beside.blocks.iter().any(|block| block.reads()),
+            curved: beside.blocks.iter().any(|playing| playing.block.reads()),
             beside,
             previous: None,
             start,
@@ -212,7 +233,7 @@ impl<'a> Sensitivity<'a> {
         let Parameters { reading, thresholds, slopes, half_widths, weights } = self.parameters;
         let (n, zones) = (half_widths.len(), thresholds.len());
         let mut z = 0.0;
-        let speed = self.beside.speed(self.previous, u);
+        self.beside.speed_seen(self.previous, u);
         let previous = self.previous.unwrap_or(0.0);
         for j in 0..zones {
             let value = reading.zone(thresholds[j], previous, u);
@@ -234,7 +255,7 @@ impl<'a> Sensitivity<'a> {
         let mut v = 0.0;
         for i in 0..n {
             let previous = self.plays[i];
-            let (width, growth) = self.beside.width(half_widths[i], speed);
+            let (width, growth) = self.beside.width(half_widths[i]);
             let value = play(width, z, previous);
             if value != previous || half_widths[i] == 0.0 {
                 self.remembers[i] = false;
