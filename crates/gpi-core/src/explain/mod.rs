@@ -9,6 +9,7 @@
 //! 4. Back to 2 until nothing is confirmed; then the residual is tested for what is left.
 
 mod blocks;
+mod grid;
 mod noise;
 mod residual;
 mod score;

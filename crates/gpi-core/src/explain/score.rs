@@ -1,6 +1,6 @@
 //! The score (Lagrange multiplier) test: what a candidate would explain, without fitting it.
 
-use crate::effects::{Candidate, Effect, Situation};
+use crate::effects::{Candidate, Effect, Situation, Stage};
 use crate::identify::free_run::Signals;
 use crate::identify::linearization::{Linearization, Weighting};
 use crate::identify::point::{Freedom, Point};
@@ -119,26 +119,48 @@ impl<'a> Base<'a> {
 
     /// Scores of a few candidates.
     fn score(&self, candidates: &[Candidate]) -> Result<Vec<Score>, Error> {
-        /// A column of which less is left is the base model's own.
-        const LEFT: f64 = 1e-7;
-        let probes: Vec<(Point, &Effect)> = candidates
-            .iter()
-            .flat_map(|candidate| &candidate.probes)
-            .map(|probe| (self.point.with_effect(probe.clone()), probe))
+        let probes = candidates.iter().flat_map(|candidate| &candidate.probes);
+        let probes: Vec<(Point, Stage)> = probes
+            .map(|probe| (self.point.with_effect(probe.clone()), probe.block().stage()))
             .collect();
+        let Projection { left, score, squares, cost } = self.project(&probes)?;
+        let mut found = Vec::new();
+        let mut first = 0;
+        for candidate in candidates {
+            let places: Vec<usize> = (first..first + candidate.probes.len())
+                .filter(|&i| left[(i, i)] > LEFT * squares[i])
+                .collect();
+            let own =
+                Matrix::from_fn(places.len(), places.len(), |i, j| left[(places[i], places[j])]);
+            let rhs = DVector::from_fn(places.len(), |i, _| score[places[i]]);
+            let solution = solve_scaled(own, &rhs);
+            let gain = solution.dot(&rhs) / cost.max(f64::MIN_POSITIVE);
+            let mut coefficients = vec![0.0; candidate.probes.len()];
+            for (value, &place) in solution.iter().zip(&places) {
+                coefficients[place - first] = *value;
+            }
+            let columns = places.len();
+            let start = candidate.start(&coefficients);
+            found.push(Score { start, gain: gain.clamp(0.0, 1.0), columns });
+            first += candidate.probes.len();
+        }
+        Ok(found)
+    }
+
+    /// What other points, which differ from a stage of the chain on, add to the output, projected off the
+    /// base model's own sensitivities.
+    pub(crate) fn project(&self, probes: &[(Point, Stage)]) -> Result<Projection, Error> {
         let (n, unknowns) = (probes.len(), self.linearization.layout.len);
         let mut cross = Matrix::zeros(unknowns, n);
         let mut squares = Matrix::zeros(n, n);
         let mut with_residual = DVector::zeros(n);
         for (index, experiment) in self.record.experiments().iter().enumerate() {
             let known = &self.signals[index];
-            let base =
-                self.point.output_from(crate::effects::Stage::Added, known, experiment, index)?;
+            let base = self.point.output_from(Stage::Added, known, experiment, index)?;
             let columns: Result<Vec<Matrix>, Error> = probes
                 .iter()
-                .map(|(point, probe)| {
-                    let stage = probe.block().stage();
-                    Ok(point.output_from(stage, known, experiment, index)? - &base)
+                .map(|(point, stage)| {
+                    Ok(point.output_from(*stage, known, experiment, index)? - &base)
                 })
                 .collect();
             let columns = columns?;
@@ -168,34 +190,30 @@ impl<'a> Base<'a> {
                 Ok(())
             })?;
         }
-        // projected off the base model's sensitivities
         let white = self.whitening.transpose() * cross;
         let own = self.whitening.transpose() * self.linearization.descent();
-        let left = &squares - white.transpose() * &white;
-        let score = with_residual - white.transpose() * &own;
-        let cost = self.linearization.cost - own.norm_squared();
-        let mut found = Vec::new();
-        let mut first = 0;
-        for candidate in candidates {
-            let places: Vec<usize> = (first..first + candidate.probes.len())
-                .filter(|&i| left[(i, i)] > LEFT * squares[(i, i)])
-                .collect();
-            let own =
-                Matrix::from_fn(places.len(), places.len(), |i, j| left[(places[i], places[j])]);
-            let rhs = DVector::from_fn(places.len(), |i, _| score[places[i]]);
-            let solution = solve_scaled(own, &rhs);
-            let gain = solution.dot(&rhs) / cost.max(f64::MIN_POSITIVE);
-            let mut coefficients = vec![0.0; candidate.probes.len()];
-            for (value, &place) in solution.iter().zip(&places) {
-                coefficients[place - first] = *value;
-            }
-            let columns = places.len();
-            let start = candidate.start(&coefficients);
-            found.push(Score { start, gain: gain.clamp(0.0, 1.0), columns });
-            first += candidate.probes.len();
-        }
-        Ok(found)
+        Ok(Projection {
+            left: &squares - white.transpose() * &white,
+            score: with_residual - white.transpose() * &own,
+            squares: squares.diagonal(),
+            cost: self.linearization.cost - own.norm_squared(),
+        })
     }
+}
+
+/// A column of which a smaller part is left is the base model's own.
+pub(crate) const LEFT: f64 = 1e-7;
+
+/// Columns beside the base model's sensitivities.
+pub(crate) struct Projection {
+    /// Inner products of what is left of the columns.
+    pub left: Matrix,
+    /// Inner products of what is left with the residual.
+    pub score: DVector<f64>,
+    /// Squares of the columns as they were.
+    pub squares: DVector<f64>,
+    /// What the base model would leave of the residual's squares by itself.
+    pub cost: f64,
 }
 
 /// The least squares solution of symmetric equations, directions without power left out.

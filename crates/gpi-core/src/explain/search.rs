@@ -1,5 +1,6 @@
 //! The closed loop: score candidates, fit the best few jointly, keep what the held-out data confirm.
 
+use super::grid::enriched;
 use super::score::{Base, Score, scores};
 use crate::effects::{CATALOGUE, Entry};
 use crate::identify::levenberg_marquardt::{FitOptions, Fitted, fit};
@@ -48,9 +49,6 @@ pub(crate) struct Round {
     pub dropped: Vec<&'static str>,
 }
 
-/// Plays and deadzones of an input, each as far as they pay.
-const GRIDS: [(usize, usize); 3] = [(20, 9), (28, 13), (36, 17)];
-
 /// An effect that takes a smaller part of the residual's squares is of no use to anyone.
 const LEAST: f64 = 0.04;
 
@@ -66,8 +64,6 @@ pub(crate) struct Search<'a> {
     pub order_is_given: bool,
     /// Which grids may move and become finer.
     pub moving: RefineOptions,
-    /// Which of `GRIDS` the model has.
-    grid: usize,
     /// Whether a finer grid was tried since the latest effect.
     is_rich: bool,
     pub point: Point,
@@ -101,7 +97,6 @@ impl<'a> Search<'a> {
             allowed,
             order_is_given,
             moving,
-            grid: 0,
             is_rich: false,
             point: refined.fitted.point.clone(),
             cost: refined.fitted.linearization.cost,
@@ -175,49 +170,53 @@ impl<'a> Search<'a> {
     /// Moves half-widths and thresholds, which were placed before the latest effect was known: what a
     /// badly placed grid leaves looks like another effect.
     fn place_grids(&mut self, progress: Progress) -> Result<(), Error> {
-        (self.point, self.cost) = self.with_grid(GRIDS[self.grid], progress)?;
+        (self.point, self.cost) = self.on_moving_grids(self.point.clone(), progress)?;
         self.is_rich = false;
         Ok(())
     }
 
     /// Takes finer grids as long as they pay: what the declared model itself can explain is no effect.
     fn enrich(&mut self, progress: Progress) -> Result<bool, Error> {
+        /// Times that plays and deadzones are added.
+        const ROUNDS: usize = 5;
+        /// The part of the residual's squares below which a round is the last.
+        const SMALL: f64 = 0.02;
         let values = self.prepared.values();
         let mut gained = false;
-        while let Some(&grid) = GRIDS.get(self.grid + 1) {
-            let (point, cost) = self.with_grid(grid, progress)?;
-            let unknowns = |point: &Point| {
-                point.channels.iter().map(|c| 2 * (c.weights.len() + c.slopes.len())).sum::<usize>()
-            };
-            let added = unknowns(&point).saturating_sub(unknowns(&self.point)).max(1) as f64;
-            if values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln() < added * values.ln() {
+        self.is_rich = true;
+        for round in 0..ROUNDS {
+            report(progress, "finer grid", round as f64 / ROUNDS as f64)?;
+            let base = self.base()?;
+            let (point, added) = enriched(&base, &self.prepared, &self.moving)?;
+            if added == 0 {
+                break;
+            }
+            let (point, cost) = self.on_moving_grids(point, progress)?;
+            let deviance = values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln();
+            if deviance < 2.0 * added as f64 * values.ln() {
                 break;
             }
             (self.point, self.cost) = (point, cost);
-            self.grid += 1;
             gained = true;
+            if deviance < SMALL * values {
+                break;
+            }
         }
-        self.is_rich = true;
         Ok(gained)
     }
 
-    /// The present point with as many plays and deadzones an input, where they pay.
-    fn with_grid(&self, grid: (usize, usize), progress: Progress) -> Result<(Point, f64), Error> {
+    fn base(&self) -> Result<Base<'_>, Error> {
+        let Self { point, prepared, options, .. } = self;
+        Base::new(point, &prepared.record, options.freedom, &options.weighting)
+    }
+
+    /// A point fitted with grids that move, plays and deadzones without use left out; and its cost.
+    fn on_moving_grids(&self, point: Point, progress: Progress) -> Result<(Point, f64), Error> {
         const STEPS: usize = 15;
         let mut options = settings(&self.prepared, &self.moving, STEPS);
         options.weighting = self.options.weighting.clone();
         options.gain = 1e-3;
         let record = &self.prepared.record;
-        let spans = self.prepared.spans(&self.point);
-        let widest: Vec<f64> = spans.iter().map(|span| 0.5 * span).collect();
-        let mut point = self.point.clone();
-        let (plays, deadzones) = grid;
-        // what the user gives by value stays
-        let grid = (
-            if self.moving.half_widths { plays } else { 0 },
-            if self.moving.thresholds { deadzones } else { 0 },
-        );
-        point.fill_gaps(grid, &widest, &[-0.5, 0.0, 0.5], record);
         let mut fitted = fit(point, record, &options, "refinement", progress)?;
         if fitted.point.drop_unused() {
             options.steps = STEPS / 3;
@@ -228,8 +227,7 @@ impl<'a> Search<'a> {
 
     /// The best candidate of each family, the most promising first.
     fn ranked(&self, progress: Progress) -> Result<Vec<(&'static Entry, Score)>, Error> {
-        let weighting = &self.options.weighting;
-        let base = Base::new(&self.point, &self.prepared.record, self.options.freedom, weighting)?;
+        let base = self.base()?;
         let values = self.prepared.values();
         let mut best: Vec<(&'static Entry, Score, f64)> = Vec::new();
         let present = |entry: &Entry| self.point.effects.iter().any(|e| e.name() == entry.name);

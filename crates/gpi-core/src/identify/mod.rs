@@ -23,6 +23,7 @@ pub(crate) mod linearization;
 mod names;
 pub(crate) mod noise_floor;
 pub(crate) mod outliers;
+mod placement;
 pub(crate) mod point;
 pub(crate) mod preparation;
 mod quasi_static;

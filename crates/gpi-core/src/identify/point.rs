@@ -313,96 +313,6 @@ impl Point {
         moved
     }
 
-    /// Puts plays and deadzones without weight into the widest gaps between those that there are, until
-    /// every input has `plays` and `deadzones`; plays up to `widest` (one an input) and, where their past is
-    /// unknown, at `sides` beside z in turn; deadzones inside the range of the input.
-    pub(crate) fn fill_gaps(
-        &mut self,
-        (plays, deadzones): (usize, usize),
-        widest: &[f64],
-        sides: &[f64],
-        record: &Record,
-    ) {
-        for (input, channel) in self.channels.iter_mut().enumerate() {
-            let mut side = sides.iter().cycle();
-            while channel.half_widths.len() < plays {
-                let mut ends = channel.half_widths.clone();
-                ends.push(widest[input].max(ends[ends.len() - 1]));
-                let Some((place, middle)) = widest_gap(&ends) else { break };
-                channel.half_widths.insert(place, middle);
-                channel.weights.insert(place, 0.0);
-                for sides in self.pasts.iter_mut().filter_map(|past| past.plays.as_mut()) {
-                    sides[input].insert(place, side.next().copied().unwrap_or(0.0));
-                }
-            }
-            let (low, high) = range(record, input);
-            while channel.thresholds.len() < deadzones + 1 {
-                let mut ends = channel.thresholds[1..].to_vec();
-                ends.extend([low, 0.0, high]);
-                ends.sort_by(f64::total_cmp);
-                let Some((_, middle)) = widest_gap(&ends) else { break };
-                let place = channel.thresholds[1..].partition_point(|&eta| eta < middle) + 1;
-                channel.thresholds.insert(place, middle);
-                channel.slopes.insert(place, 0.0);
-            }
-        }
-    }
-
-    /// Drops plays and deadzones without weight and joins deadzones that have come together; says
-    /// whether there were any.
-    pub(crate) fn drop_unused(&mut self) -> bool {
-        /// Thresholds closer than this fraction of their range are one.
-        const TOGETHER: f64 = 3e-3;
-        let mut dropped = false;
-        for (input, channel) in self.channels.iter_mut().enumerate() {
-            let bounds = |f: fn(f64, f64) -> f64| channel.thresholds.iter().copied().fold(0.0, f);
-            let closest = TOGETHER * (bounds(f64::max) - bounds(f64::min));
-            for place in 2..channel.thresholds.len() {
-                if channel.thresholds[place] - channel.thresholds[place - 1] < closest {
-                    channel.slopes[place] += std::mem::take(&mut channel.slopes[place - 1]);
-                }
-            }
-            let used = |place: &usize, weights: &[f64]| *place == 0 || weights[*place] != 0.0;
-            let plays: Vec<usize> =
-                (0..channel.weights.len()).filter(|i| used(i, &channel.weights)).collect();
-            let zones: Vec<usize> =
-                (0..channel.slopes.len()).filter(|j| used(j, &channel.slopes)).collect();
-            dropped |= plays.len() < channel.weights.len() || zones.len() < channel.slopes.len();
-            let keep = |values: &mut Vec<f64>, places: &[usize]| {
-                *values = places.iter().map(|&place| values[place]).collect();
-            };
-            keep(&mut channel.weights, &plays);
-            keep(&mut channel.half_widths, &plays);
-            keep(&mut channel.slopes, &zones);
-            keep(&mut channel.thresholds, &zones);
-            for sides in self.pasts.iter_mut().filter_map(|past| past.plays.as_mut()) {
-                keep(&mut sides[input], &plays);
-            }
-        }
-        dropped
-    }
-
-    /// Takes the weight from the deadzone, the identity apart, that has the largest share in each
-    /// direction that the data do not determine; says whether there was one.
-    pub(crate) fn silence_deadzones(&mut self, layout: &Layout, open: &Matrix) -> bool {
-        /// Where it has a smaller share, the direction is about something else.
-        const SHARE: f64 = 0.3;
-        let mut silenced = false;
-        for direction in open.column_iter() {
-            let share = |i: &usize| direction[*i].abs();
-            let zones = layout.slopes.iter().enumerate();
-            let zones = zones.flat_map(|(input, unknowns)| {
-                unknowns.clone().skip(1).zip(1..).map(move |(i, place)| (input, place, i))
-            });
-            let largest = zones.max_by(|a, b| share(&a.2).total_cmp(&share(&b.2)));
-            if let Some((input, place, _)) = largest.filter(|(_, _, i)| share(i) > SHARE) {
-                self.channels[input].slopes[place] = 0.0;
-                silenced = true;
-            }
-        }
-        silenced
-    }
-
     /// The point with one more effect, in its place of the chain.
     pub(crate) fn with_effect(&self, effect: Effect) -> Self {
         let mut point = self.clone();
@@ -526,13 +436,6 @@ impl Point {
         }
         moved
     }
-}
-
-/// Where a value stands that halves the widest gap of ascending ones, and the value.
-fn widest_gap(ascending: &[f64]) -> Option<(usize, f64)> {
-    let gaps = ascending.windows(2).enumerate();
-    let (place, gap) = gaps.max_by(|a, b| (a.1[1] - a.1[0]).total_cmp(&(b.1[1] - b.1[0])))?;
-    (gap[1] > gap[0]).then(|| (place + 1, 0.5 * (gap[0] + gap[1])))
 }
 
 /// Smallest and largest input of all experiments.

@@ -1,0 +1,92 @@
+//! Plays and deadzones that come and go.
+
+use super::point::{Layout, Point};
+use crate::Matrix;
+
+impl Point {
+    /// The point with one more play, where there is none of its half-width; its past lies between those of
+    /// its neighbours.
+    pub(crate) fn with_play(&self, input: usize, half_width: f64, weight: f64) -> Self {
+        let mut point = self.clone();
+        let channel = &mut point.channels[input];
+        let place = channel.half_widths.partition_point(|&r| r < half_width);
+        channel.half_widths.insert(place, half_width);
+        channel.weights.insert(place, weight);
+        for sides in point.pasts.iter_mut().filter_map(|past| past.plays.as_mut()) {
+            let neighbours = [place.checked_sub(1), Some(place)];
+            let near: Vec<f64> = neighbours
+                .into_iter()
+                .flatten()
+                .filter_map(|i| sides[input].get(i).copied())
+                .collect();
+            let side = near.iter().sum::<f64>() / near.len().max(1) as f64;
+            sides[input].insert(place, side);
+        }
+        point
+    }
+
+    /// The point with one more deadzone.
+    pub(crate) fn with_deadzone(&self, input: usize, threshold: f64, slope: f64) -> Self {
+        let mut point = self.clone();
+        let channel = &mut point.channels[input];
+        let place = channel.thresholds[1..].partition_point(|&eta| eta < threshold) + 1;
+        channel.thresholds.insert(place, threshold);
+        channel.slopes.insert(place, slope);
+        point
+    }
+
+    /// Drops plays and deadzones without weight and joins deadzones that have come together; says
+    /// whether there were any.
+    pub(crate) fn drop_unused(&mut self) -> bool {
+        /// Thresholds closer than this fraction of their range are one.
+        const TOGETHER: f64 = 3e-3;
+        let mut dropped = false;
+        for (input, channel) in self.channels.iter_mut().enumerate() {
+            let bounds = |f: fn(f64, f64) -> f64| channel.thresholds.iter().copied().fold(0.0, f);
+            let closest = TOGETHER * (bounds(f64::max) - bounds(f64::min));
+            for place in 2..channel.thresholds.len() {
+                if channel.thresholds[place] - channel.thresholds[place - 1] < closest {
+                    channel.slopes[place] += std::mem::take(&mut channel.slopes[place - 1]);
+                }
+            }
+            let used = |place: &usize, weights: &[f64]| *place == 0 || weights[*place] != 0.0;
+            let plays: Vec<usize> =
+                (0..channel.weights.len()).filter(|i| used(i, &channel.weights)).collect();
+            let zones: Vec<usize> =
+                (0..channel.slopes.len()).filter(|j| used(j, &channel.slopes)).collect();
+            dropped |= plays.len() < channel.weights.len() || zones.len() < channel.slopes.len();
+            let keep = |values: &mut Vec<f64>, places: &[usize]| {
+                *values = places.iter().map(|&place| values[place]).collect();
+            };
+            keep(&mut channel.weights, &plays);
+            keep(&mut channel.half_widths, &plays);
+            keep(&mut channel.slopes, &zones);
+            keep(&mut channel.thresholds, &zones);
+            for sides in self.pasts.iter_mut().filter_map(|past| past.plays.as_mut()) {
+                keep(&mut sides[input], &plays);
+            }
+        }
+        dropped
+    }
+
+    /// Takes the weight from the deadzone, the identity apart, that has the largest share in each
+    /// direction that the data do not determine; says whether there was one.
+    pub(crate) fn silence_deadzones(&mut self, layout: &Layout, open: &Matrix) -> bool {
+        /// Where it has a smaller share, the direction is about something else.
+        const SHARE: f64 = 0.3;
+        let mut silenced = false;
+        for direction in open.column_iter() {
+            let share = |i: &usize| direction[*i].abs();
+            let zones = layout.slopes.iter().enumerate();
+            let zones = zones.flat_map(|(input, unknowns)| {
+                unknowns.clone().skip(1).zip(1..).map(move |(i, place)| (input, place, i))
+            });
+            let largest = zones.max_by(|a, b| share(&a.2).total_cmp(&share(&b.2)));
+            if let Some((input, place, _)) = largest.filter(|(_, _, i)| share(i) > SHARE) {
+                self.channels[input].slopes[place] = 0.0;
+                silenced = true;
+            }
+        }
+        silenced
+    }
+}
