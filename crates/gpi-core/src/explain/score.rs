@@ -27,14 +27,20 @@ pub(crate) fn scores(
     candidates: &[Candidate],
     check: &mut dyn FnMut(f64) -> Result<(), Error>,
 ) -> Result<Vec<Score>, Error> {
-    /// Candidates whose columns are held at once.
-    const AT_ONCE: usize = 24;
+    /// Numbers that the columns held at once may take.
+    const AT_ONCE: usize = 20_000_000;
+    let columns = (AT_ONCE / base.record.samples().max(1)).max(1);
     let mut scores = Vec::new();
-    let groups = candidates.chunks(AT_ONCE);
-    let count = groups.len().max(1) as f64;
-    for (number, group) in groups.enumerate() {
-        check(number as f64 / count)?;
-        scores.extend(base.score(group)?);
+    while let Some(first) = candidates.get(scores.len()) {
+        check(scores.len() as f64 / candidates.len() as f64)?;
+        let rest = &candidates[scores.len()..];
+        let mut filled = first.probes.len();
+        let fits = |candidate: &&Candidate| {
+            filled += candidate.probes.len();
+            filled <= columns
+        };
+        let count = 1 + rest[1..].iter().take_while(fits).count();
+        scores.extend(base.score(&rest[..count])?);
     }
     Ok(scores)
 }

@@ -64,7 +64,7 @@ pub(crate) struct Search<'a> {
     pub order_is_given: bool,
     /// Which grids may move and become finer.
     pub moving: RefineOptions,
-    /// Whether a finer grid was tried since the latest effect.
+    /// Whether the grids were placed anew since the latest effect.
     is_rich: bool,
     pub point: Point,
     pub cost: f64,
@@ -131,12 +131,12 @@ impl<'a> Search<'a> {
         let mut ranked = self.ranked(progress)?;
         // A strong candidate is looked at first: the grid would bend to what it explains.
         let most = ranked.iter().map(|(_, score)| score.gain).fold(0.0, f64::max);
-        if most < HOPELESS {
-            self.last.clear();
-            return Ok(());
-        }
         if most < STRONG && !self.is_rich && self.enrich(progress)? {
             ranked = self.ranked(progress)?;
+        }
+        if ranked.iter().all(|(_, score)| score.gain < HOPELESS) {
+            self.last.clear();
+            return Ok(());
         }
         let before = self.held_out(&self.point)?;
         let mut trials = Vec::new();
@@ -162,23 +162,17 @@ impl<'a> Search<'a> {
         }
         self.rounds.push(Round { trial: taken, others, dropped: Vec::new() });
         self.repair()?;
-        self.place_grids(progress)?;
+        // the grids were placed before this effect was known
+        self.is_rich = false;
         self.backward(progress)?;
         Ok(())
     }
 
-    /// Moves half-widths and thresholds, which were placed before the latest effect was known: what a
-    /// badly placed grid leaves looks like another effect.
-    fn place_grids(&mut self, progress: Progress) -> Result<(), Error> {
-        (self.point, self.cost) = self.on_moving_grids(self.point.clone(), progress)?;
-        self.is_rich = false;
-        Ok(())
-    }
-
-    /// Takes finer grids as long as they pay: what the declared model itself can explain is no effect.
+    /// Moves half-widths and thresholds, and takes finer grids as long as they pay: what the declared model
+    /// itself can explain is no effect. Says whether the model became better.
     fn enrich(&mut self, progress: Progress) -> Result<bool, Error> {
         /// Times that plays and deadzones are added.
-        const ROUNDS: usize = 5;
+        const ROUNDS: usize = 6;
         /// The part of the residual's squares below which a round is the last.
         const SMALL: f64 = 0.02;
         let values = self.prepared.values();
@@ -186,9 +180,8 @@ impl<'a> Search<'a> {
         self.is_rich = true;
         for round in 0..ROUNDS {
             report(progress, "finer grid", round as f64 / ROUNDS as f64)?;
-            let base = self.base()?;
-            let (point, added) = enriched(&base, &self.prepared, &self.moving)?;
-            if added == 0 {
+            let (point, added) = enriched(&self.base()?, &self.prepared, &self.moving)?;
+            if added == 0 && round > 0 {
                 break;
             }
             let (point, cost) = self.on_moving_grids(point, progress)?;
@@ -229,22 +222,24 @@ impl<'a> Search<'a> {
     fn ranked(&self, progress: Progress) -> Result<Vec<(&'static Entry, Score)>, Error> {
         let base = self.base()?;
         let values = self.prepared.values();
-        let mut best: Vec<(&'static Entry, Score, f64)> = Vec::new();
         let present = |entry: &Entry| self.point.effects.iter().any(|e| e.name() == entry.name);
         // G of any order takes a delay for itself
         let of_use = |entry: &Entry| entry.name != "delay" || self.order_is_given;
         let usable = |entry: &&&Entry| of_use(entry) && (entry.repeats || !present(entry));
+        let (mut entries, mut candidates) = (Vec::new(), Vec::new());
         for &entry in self.allowed.iter().filter(usable) {
-            let candidates = base.situation(entry.candidates);
-            let mut check = |done| report(progress, entry.name, done);
-            for score in scores(&base, &candidates, &mut check)? {
-                let deviance = -values * (1.0 - score.gain).max(1e-300).ln();
-                let worth = deviance - score.columns as f64 * values.ln();
-                match best.iter_mut().find(|(known, _, _)| known.name == entry.name) {
-                    Some(known) if known.2 < worth => *known = (entry, score, worth),
-                    Some(_) => {}
-                    None => best.push((entry, score, worth)),
-                }
+            candidates.extend(base.situation(entry.candidates));
+            entries.resize(candidates.len(), entry);
+        }
+        let mut check = |done| report(progress, "score test", done);
+        let mut best: Vec<(&'static Entry, Score, f64)> = Vec::new();
+        for (entry, score) in entries.into_iter().zip(scores(&base, &candidates, &mut check)?) {
+            let deviance = -values * (1.0 - score.gain).max(1e-300).ln();
+            let worth = deviance - score.columns as f64 * values.ln();
+            match best.iter_mut().find(|(known, _, _)| known.name == entry.name) {
+                Some(known) if known.2 < worth => *known = (entry, score, worth),
+                Some(_) => {}
+                None => best.push((entry, score, worth)),
             }
         }
         best.sort_by(|a, b| b.2.total_cmp(&a.2));
