@@ -200,7 +200,7 @@ impl Model {
         Ok(output)
     }
 
-    /// The output stage, and what is added behind it.
+    /// The output stage, and what is added before and behind it.
     pub(crate) fn read_from(
         &self,
         state: &mut ModelState,
@@ -208,6 +208,7 @@ impl Model {
         covariates: &Matrix,
     ) {
         let first = state.sample;
+        self.add_from(Stage::Displaced, state, output, covariates);
         for (block, memory) in self.at_stage(&mut state.effects, Stage::Output) {
             let mut column = output.column_mut(block.channel());
             if memory.is_empty() {
@@ -217,10 +218,21 @@ impl Model {
                 *value = block.sense(memory, *value, self.moment(first + k, &[])).0;
             }
         }
+        self.add_from(Stage::Added, state, output, covariates);
+    }
+
+    fn add_from(
+        &self,
+        stage: Stage,
+        state: &mut ModelState,
+        output: &mut Matrix,
+        covariates: &Matrix,
+    ) {
+        let first = state.sample;
         let rows = covariates.transpose();
         let width = rows.nrows();
         let at = |k: usize| &rows.as_slice()[k * width..(k + 1) * width];
-        for (block, memory) in self.at_stage(&mut state.effects, Stage::Added) {
+        for (block, memory) in self.at_stage(&mut state.effects, stage) {
             if memory.is_empty() {
                 *memory = block.rest(0.0, self.moment(0, at(0)));
             }

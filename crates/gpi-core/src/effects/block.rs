@@ -1,5 +1,7 @@
 //! What an effect can do.
 
+use super::Effect;
+
 /// Where an effect stands in the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
@@ -9,7 +11,9 @@ pub enum Stage {
     Plays,
     /// In or beside the linear dynamics.
     Dynamics,
-    /// Between the dynamics and the sensor's reading.
+    /// Added to the displacement: what moves the stage itself.
+    Displaced,
+    /// Between the displacement and the sensor's reading.
     Output,
     /// Added to the output, whatever the input does.
     Added,
@@ -24,6 +28,7 @@ impl Stage {
             Self::Input => "input",
             Self::Plays => "plays",
             Self::Dynamics => "dynamics",
+            Self::Displaced => "displaced",
             Self::Output => "output",
             Self::Added => "added",
             Self::Noise => "noise",
@@ -186,7 +191,13 @@ pub trait Block {
         (output, Slope::Times(1.0))
     }
 
-    /// Added: what comes on top.
+    /// The same in the other place of the chain where it may stand, if there is one: before or behind the
+    /// output stage.
+    fn elsewhere(&self) -> Option<Effect> {
+        None
+    }
+
+    /// Displaced or added: what comes on top.
     fn add(&self, state: &mut [f64], moment: Moment) -> f64 {
         let _ = (state, moment);
         0.0

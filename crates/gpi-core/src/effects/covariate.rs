@@ -1,6 +1,6 @@
 //! Another measured column that leaks in.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
+use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
 
 /// `y += g L x`: a measured column x (a temperature, a neighbouring axis) leaks in, at once or through a
 /// first-order lag L of unit gain and time constant T.
@@ -8,6 +8,9 @@ use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
 pub struct Covariate {
     /// The output that it adds to.
     pub output: usize,
+    /// Whether it moves the stage, before the output stage, and not only the reading.
+    #[serde(default)]
+    pub moves_stage: bool,
     /// The column's place among the record's covariates.
     pub column: usize,
     /// Its name.
@@ -52,7 +55,15 @@ impl Covariate {
                 for &time_constant in &lags {
                     let label = channel.name.clone();
                     let step = 1e-3 * situation.span(output) / (high - low);
-                    let block = Self { output, column, label, gain: 0.0, time_constant, step };
+                    let block = Self {
+                        output,
+                        moves_stage: false,
+                        column,
+                        label,
+                        gain: 0.0,
+                        time_constant,
+                        step,
+                    };
                     found.push(Candidate::linear(block, [0]));
                 }
             }
@@ -67,7 +78,11 @@ impl Block for Covariate {
     }
 
     fn stage(&self) -> Stage {
-        Self::STAGE
+        if self.moves_stage { Stage::Displaced } else { Self::STAGE }
+    }
+
+    fn elsewhere(&self) -> Option<Effect> {
+        Some(Self { moves_stage: !self.moves_stage, ..self.clone() }.into())
     }
 
     fn channel(&self) -> usize {

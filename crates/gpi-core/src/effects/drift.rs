@@ -1,6 +1,6 @@
 //! Slow change that the input does not drive.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units, knots};
+use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units, knots};
 
 /// `y += d(t)`, d a slow function of time: straight lines between evenly spaced knots, the first of which
 /// is 0 (the offset at the start is the model's).
@@ -8,6 +8,9 @@ use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units, knots};
 pub struct Drift {
     /// The output that drifts.
     pub output: usize,
+    /// Whether it moves the stage, before the output stage, and not only the reading.
+    #[serde(default)]
+    pub moves_stage: bool,
     /// d at the second knot, the third, .., in the output's unit.
     pub changes: Vec<f64>,
     /// Seconds from the first knot to the last.
@@ -27,7 +30,10 @@ impl Drift {
         let duration = situation.duration();
         let block = |output, knots: usize| {
             let (changes, span) = (vec![0.0; knots - 1], situation.span(output));
-            Candidate::linear(Self { output, changes, duration, span }, 0..knots - 1)
+            Candidate::linear(
+                Self { output, moves_stage: false, changes, duration, span },
+                0..knots - 1,
+            )
         };
         let blocks = |output| [2, 3, 5, 9, 17, 33].map(|knots| block(output, knots));
         situation.outputs().flat_map(blocks).collect()
@@ -40,7 +46,11 @@ impl Block for Drift {
     }
 
     fn stage(&self) -> Stage {
-        Self::STAGE
+        if self.moves_stage { Stage::Displaced } else { Self::STAGE }
+    }
+
+    fn elsewhere(&self) -> Option<Effect> {
+        Some(Self { moves_stage: !self.moves_stage, ..self.clone() }.into())
     }
 
     fn channel(&self) -> usize {

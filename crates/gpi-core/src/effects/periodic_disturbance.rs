@@ -1,6 +1,6 @@
 //! A line that the input does not drive.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
+use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
@@ -9,6 +9,9 @@ use rustfft::FftPlanner;
 pub struct PeriodicDisturbance {
     /// The output that it adds to.
     pub output: usize,
+    /// Whether it moves the stage, before the output stage, and not only the reading.
+    #[serde(default)]
+    pub moves_stage: bool,
     /// f in Hz.
     pub frequency: f64,
     /// a, in the output's unit.
@@ -35,7 +38,15 @@ impl PeriodicDisturbance {
         let block = |output: usize| {
             let frequency = outstanding(situation, output)?;
             let span = situation.span(output);
-            let block = Self { output, frequency, cosine: 0.0, sine: 0.0, duration, span };
+            let block = Self {
+                output,
+                moves_stage: false,
+                frequency,
+                cosine: 0.0,
+                sine: 0.0,
+                duration,
+                span,
+            };
             Some(Candidate::linear(block, 1..3))
         };
         situation.outputs().filter_map(block).collect()
@@ -94,7 +105,11 @@ impl Block for PeriodicDisturbance {
     }
 
     fn stage(&self) -> Stage {
-        Self::STAGE
+        if self.moves_stage { Stage::Displaced } else { Self::STAGE }
+    }
+
+    fn elsewhere(&self) -> Option<Effect> {
+        Some(Self { moves_stage: !self.moves_stage, ..self.clone() }.into())
     }
 
     fn channel(&self) -> usize {

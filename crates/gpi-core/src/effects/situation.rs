@@ -30,6 +30,13 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
+    /// The same in the other place of the chain where it may stand.
+    pub(crate) fn elsewhere(&self) -> Option<Self> {
+        let moved = |effect: &Effect| effect.block().elsewhere();
+        let probes: Option<Vec<Effect>> = self.probes.iter().map(moved).collect();
+        Some(Self { block: moved(&self.block)?, probes: probes?, linear: self.linear })
+    }
+
     /// A block whose values, at these places, are linear in the output: probes move them by its steps.
     pub(crate) fn linear(
         block: impl Into<Effect>,

@@ -2,7 +2,7 @@
 
 use super::grid::enriched;
 use super::score::{Base, Score, scores};
-use crate::effects::{CATALOGUE, Entry};
+use crate::effects::{CATALOGUE, Candidate, Entry, Stage};
 use crate::identify::levenberg_marquardt::{FitOptions, Fitted, fit};
 use crate::identify::outliers;
 use crate::identify::point::Point;
@@ -164,6 +164,7 @@ impl<'a> Search<'a> {
         self.repair()?;
         // the grids were placed before this effect was known
         self.is_rich = false;
+        self.rearrange(progress)?;
         self.backward(progress)?;
         Ok(())
     }
@@ -228,7 +229,11 @@ impl<'a> Search<'a> {
         let usable = |entry: &&&Entry| of_use(entry) && (entry.repeats || !present(entry));
         let (mut entries, mut candidates) = (Vec::new(), Vec::new());
         for &entry in self.allowed.iter().filter(usable) {
-            candidates.extend(base.situation(entry.candidates));
+            let found = base.situation(entry.candidates);
+            // before and behind the output stage is the same where there is none
+            let elsewhere = found.iter().filter_map(Candidate::elsewhere).filter(|_| self.senses());
+            candidates.extend(elsewhere.collect::<Vec<_>>());
+            candidates.extend(found);
             entries.resize(candidates.len(), entry);
         }
         let mut check = |done| report(progress, "score test", done);
@@ -333,6 +338,30 @@ impl<'a> Search<'a> {
             None => why.push_str("is not confirmed by the held-out blocks"),
         }
         Rejected { effect: trial.entry.name, holdout_rms, why, confounded_with }
+    }
+
+    /// Whether the model has an output stage.
+    fn senses(&self) -> bool {
+        self.point.at_stage(Stage::Output).next().is_some()
+    }
+
+    /// Puts what is added to the other side of the output stage where that explains more.
+    fn rearrange(&mut self, progress: Progress) -> Result<(), Error> {
+        /// The part by which the residual's squares must fall.
+        const LEAST: f64 = 0.01;
+        if !self.senses() {
+            return Ok(());
+        }
+        let record = &self.prepared.record;
+        for place in 0..self.point.effects.len() {
+            let Some(other) = self.point.effects[place].block().elsewhere() else { continue };
+            let moved = self.point.without_effect(place).with_effect(other);
+            let fitted = fit(moved, record, &self.options, "rearrangement", progress)?;
+            if fitted.linearization.cost < (1.0 - LEAST) * self.cost {
+                (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
+            }
+        }
+        Ok(())
     }
 
     /// Drops effects that a later one has made superfluous.

@@ -104,9 +104,9 @@ impl Point {
         }
     }
 
-    /// Adds what the input does not drive.
-    pub(crate) fn add(&self, experiment: &Experiment, output: &mut Matrix) {
-        for effect in self.at_stage(Stage::Added) {
+    /// Adds what the input does not drive, to the displacement or to the reading.
+    pub(crate) fn add(&self, stage: Stage, experiment: &Experiment, output: &mut Matrix) {
+        for effect in self.at_stage(stage) {
             let block = effect.block();
             let rows = experiment.covariates.transpose();
             let covariates = |k: usize| {
@@ -148,10 +148,11 @@ impl Point {
                 self.displacement(&v, experiment, past)?
             }
             Stage::Dynamics => self.displacement(&known.intermediate, experiment, past)?,
-            Stage::Output | Stage::Added | Stage::Noise => known.displacement.clone(),
+            _ => known.displacement.clone(),
         };
+        self.add(Stage::Displaced, experiment, &mut output);
         self.sense(&mut output);
-        self.add(experiment, &mut output);
+        self.add(Stage::Added, experiment, &mut output);
         Ok(output)
     }
 

@@ -36,6 +36,8 @@ pub(crate) struct Stream<'a> {
     drive: Matrix,
     /// Derivatives by the values of effects, `[effect][value]`.
     effects: Vec<Vec<Matrix>>,
+    /// What effects add to the displacement, (samples, outputs).
+    displaced: Matrix,
     /// What effects add to the output, (samples, outputs).
     added: Matrix,
     feedback: Feedback,
@@ -189,14 +191,16 @@ impl<'a> Stream<'a> {
             tangents: Matrix::zeros(if closed { layout.len } else { 0 }, order),
             drives: Matrix::zeros(order, 2),
         };
+        let added = |stage| {
+            let mut added = Matrix::zeros(experiment.input.nrows(), outputs);
+            point.add(stage, experiment, &mut added);
+            added
+        };
         Ok(Self {
             drive: point.drive(experiment),
             effects: point.effect_columns(experiment, index)?,
-            added: {
-                let mut added = Matrix::zeros(experiment.input.nrows(), outputs);
-                point.add(experiment, &mut added);
-                added
-            },
+            displaced: added(Stage::Displaced),
+            added: added(Stage::Added),
             feedback,
             sections: sections.collect(),
             point,
@@ -247,7 +251,8 @@ impl<'a> Stream<'a> {
             }
             if k == 0 {
                 let first = |output| {
-                    Sensing::new(self.point, output, self.displacement(output), self.layout.len)
+                    let first = self.displacement(output) + self.displaced[(0, output)];
+                    Sensing::new(self.point, output, first, self.layout.len)
                 };
                 sensing = (0..outputs).map(first).collect();
             }
@@ -258,7 +263,8 @@ impl<'a> Stream<'a> {
                     let row = if counts { own.as_mut_slice() } else { &mut unscored[..] };
                     let displacement = self.fill(output, row);
                     self.turn(output, displacement, Some(row));
-                    let sensed = sensing[output].step(displacement, Some(row), moment);
+                    let displaced = displacement + self.displaced[(k, output)];
+                    let sensed = sensing[output].step(displaced, Some(row), moment);
                     if counts {
                         let simulated = sensed + self.fill_added(output, k, row);
                         let measured = self.experiment.output[(k, output)];
@@ -267,7 +273,8 @@ impl<'a> Stream<'a> {
                 } else if traced {
                     let displacement = self.displacement(output);
                     self.turn(output, displacement, None);
-                    sensing[output].step(displacement, None, moment);
+                    let displaced = displacement + self.displaced[(k, output)];
+                    sensing[output].step(displaced, None, moment);
                 }
             }
             if counts {
