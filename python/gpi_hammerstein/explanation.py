@@ -106,17 +106,23 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
     shown: set[str] = set()
     for step in result["steps"]:
         name = step["effect"]
-        if name is None or not step["parameters"] or name in shown:
+        if name is None or not step["parameters"]:
             continue
-        shown.add(name)
         numbers = ", ".join(number(label, row) for label, row in list(step["parameters"].items())[:6])
-        yield f"{name} ({names[name]}): {numbers}."
+        yield f"{name} ({'one more' if name in shown else names[name]}): {numbers}."
+        shown.add(name)
     for other in result["rejected"]:
         if other["confounded_with"]:
             yield f"{other['effect']} {other['why']}: this record cannot tell them apart."
     floor = result["noise_floor"]["rms"]
     left = result["error"]["after"]["train"]["rms"]
-    yield f"What is left is {left:.4g}{space} rms; the noise floor is {floor:.4g}{space}."
+    if is_above(floor, left):
+        yield (
+            f"What is left is {left:.4g}{space} rms, less than the {floor:.4g}{space} by which the output "
+            "varies where the input rests or repeats itself: what was missing is in these as well."
+        )
+    else:
+        yield f"What is left is {left:.4g}{space} rms; the noise floor is {floor:.4g}{space}."
     failed = [test for test in result["residual"]["tests"] if not test["passed"]]
     for test in failed:
         yield (
@@ -130,6 +136,11 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
     }[result["verdict"]]
     if result["next_experiment"]:
         yield f"Next: {result['next_experiment']['why']}."
+
+
+def is_above(floor: float, left: float) -> bool:
+    """Return whether a noise floor is above what is left: it was seen with an effect in it, such as hum."""
+    return floor > 1.2 * left
 
 
 def number(label: str, row: Mapping[str, Any]) -> str:

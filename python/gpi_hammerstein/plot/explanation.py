@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from gpi_hammerstein._native import Explanation
+from gpi_hammerstein.explanation import is_above
 from gpi_hammerstein.plot.style import BLACK, BLUE, ORANGE, VERMILION, axes, label
 
 # More points than a picture has pixels only make its file large.
@@ -37,8 +38,9 @@ def residual_in_time(
     ax = axes(ax, 9.0, 4.0)
     before, after = pair(found, experiment, output)
     t = np.arange(len(before)) / found.record.rate
-    ax.plot(t, before, color=ORANGE, lw=0.6, label=f"before: {rms_text(before)}")
-    ax.plot(t, after, color=BLUE, lw=0.6, label=f"after: {rms_text(after)}")
+    unit = found.record.output_units[output]
+    ax.plot(t, before, color=ORANGE, lw=0.6, label=f"before: {rms(before):.3g} {unit} rms")
+    ax.plot(t, after, color=BLUE, lw=0.6, label=f"after: {rms(after):.3g} {unit} rms")
     for first, last in found.held_out[experiment]:
         ax.axvspan(t[first], t[last - 1], color=BLACK, alpha=0.08, lw=0)
     # Wrong samples must not hide the rest.
@@ -83,8 +85,10 @@ def residual_spectrum(
         segment = min(len(values), 8192)
         frequency, power = scipy.signal.welch(values, found.record.rate, nperseg=segment)
         ax.loglog(frequency[1:], np.sqrt(power[1:]), color=color, lw=0.9, label=name)
-    noise = found.noise_floor["rms"][output] / np.sqrt(found.record.rate / 2)
-    ax.axhline(noise, color=BLACK, lw=0.8, ls=":", label="noise floor, if white")
+    floor = found.noise_floor["rms"][output]
+    if not is_above(floor, rms(pair(found, experiment, output)[1])):
+        density = floor / np.sqrt(found.record.rate / 2)
+        ax.axhline(density, color=BLACK, lw=0.8, ls=":", label="noise floor, if white")
     ax.set_xlabel("frequency [Hz]")
     unit = found.record.output_units[output]
     ax.set_ylabel(label("residual density", f"{unit}/√Hz" if unit else ""))
@@ -176,9 +180,9 @@ def pair(found: Explanation, experiment: int, output: int) -> tuple[NDArray[np.f
     return before[:, output], after[:, output]
 
 
-def rms_text(values: NDArray[np.float64]) -> str:
-    """Return the root mean square for a legend."""
-    return f"{float(np.sqrt(np.mean(np.square(values)))):.3g} rms"
+def rms(values: NDArray[np.float64]) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def residual_label(found: Explanation, output: int) -> str:
