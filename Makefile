@@ -22,8 +22,8 @@ heading = @printf '\n== %s ==\n' '$(1)'
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
 
-demo: $(NATIVE) ## Run `gpi demo`
-	$(BIN)/gpi demo
+demo: $(NATIVE) ## Run `gpi demo`, pictures in out/demo
+	$(BIN)/gpi demo -o out/demo
 
 test: $(TOOLS) lint-rust test-rust lint-python test-python ## Check and test everything
 

@@ -369,13 +369,3 @@ def test_the_process_leaves_with_the_code() -> None:
         assert name in help_.stdout
     missing = subprocess.run([*command, "identify", "none.csv"], capture_output=True, text=True)
     assert missing.returncode == 3 and missing.stdout == ""
-
-
-def test_demo_shows_what_hysteresis_is_worth(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    result = call(capsys, "demo", "-o", out)
-    before, after = result["error"]["linear"]["holdout"], result["error"]["identified"]["holdout"]
-    assert after["rms"] < 0.25 * before["rms"]
-    assert sorted(file.name for file in out.iterdir()) == result["files"]
-    model = gpi.load(out / "model.json")
-    again = Path(gpi.__file__).parent / "data" / "demo_again.csv.gz"
-    assert model.error(gpi.read_record(again))["rms"] == pytest.approx(after["rms"], rel=1e-9)

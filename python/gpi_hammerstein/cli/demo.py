@@ -1,126 +1,86 @@
 """`gpi demo`: the whole of it on a record that comes along."""
 
+import json
 from importlib.resources import as_file, files
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from rich.console import Console
 from rich.markup import escape
 
 import gpi_hammerstein._native as native
-from gpi_hammerstein._native import Fir, Model, Record
+from gpi_hammerstein._native import Explanation
 from gpi_hammerstein.cli import options
+from gpi_hammerstein.cli.explain import before_and_after, write_results
 from gpi_hammerstein.cli.identification import describe_model
-from gpi_hammerstein.cli.output import (
-    console,
-    error_table,
-    picture,
-    print_json,
-    progress_bar,
-    say_written,
-    working,
-    write_json,
-)
-from gpi_hammerstein.files import save_model, staged
+from gpi_hammerstein.cli.output import console, print_json, progress_bar, say_written
+from gpi_hammerstein.cli.validate import residual_figures
+from gpi_hammerstein.explanation import in_words, join, to_dict
 from gpi_hammerstein.io import read_record
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-# Long enough for the resonance to ring down.
-LINEAR_TAPS = 128
+DATA = files("gpi_hammerstein") / "data"
+RECORD, TRUTH = "demo.csv.gz", "demo.truth.json"
 
 
 def demo(out: options.Out = None, as_json: options.Json = False) -> None:
-    """Identify the record that comes along and test it on another experiment of the same actuator.
+    """Identify the record that comes along, find what the model lacks, and compare before and after.
 
-    Compares a linear model with the identified one. Writes model.json, demo.json and pictures to DIR.
+    The record is a simulated piezo stage with effects that the model is not told of. Writes model.json,
+    demo.json and pictures to DIR.
     """
-    train, test = bundled("demo.csv.gz"), bundled("demo_again.csv.gz")
-    linear = native.fir(train.u, train.y, LINEAR_TAPS)
+    with as_file(DATA / RECORD) as path:
+        record = read_record(path)
+    truth = json.loads((DATA / TRUTH).read_text(encoding="utf-8"))
     with progress_bar() as progress:
-        model = native.identify(train, progress=progress)
+        found = native.explain(record, progress=progress)
     result: dict[str, Any] = {
         "schema": "gpi-demo/1",
-        "record": {"samples": train.samples, "rate_hz": train.rate, "holdout_samples": test.samples},
-        **describe_model(model),
-        "error": {
-            "linear": {"train": linear_error(linear, train), "holdout": linear_error(linear, test)},
-            "identified": {"train": model.error(train, fit_start=True), "holdout": model.error(test)},
-        },
+        "identified": describe_model(found.base),
+        "left": residual_figures(found.base, record)[0],
+        "explanation": to_dict(found),
+        "truth": truth,
         "files": [],
     }
     if out is not None:
-        from gpi_hammerstein.cli.pictures import write_pictures
-
-        with working("drawing"), staged(out) as folder:
-            write_pictures(folder, model, train, test)
-            picture(folder / "before_after.png", lambda ax: draw_comparison(ax, linear, model, test), 10.0)
-            save_model(model, folder / "model.json")
-            result["files"] = sorted([*(file.name for file in folder.iterdir()), "demo.json"])
-            write_json(result, folder / "demo.json")
+        write_results(out, found, result, "demo.json")
     if as_json:
         print_json(result)
-        return
-    screen = console()
+    else:
+        tell(console(), found, result, out)
+
+
+def tell(screen: Console, found: Explanation, result: dict[str, Any], out: Path | None) -> None:
+    """Print the story: what is identified, what is left, what is missing, before and after."""
+    record, explanation, truth = found.record, result["explanation"], result["truth"]
+    unit = record.output_units[0]
+    before, after = (explanation["error"][when]["holdout"] for when in ("before", "after"))
     screen.print(
-        f"A simulated piezo stage, V to {escape(train.output_units[0])}, at {train.rate:g} Hz: "
-        f"{train.samples} samples to fit on, {test.samples} samples of another experiment to test on."
+        escape(f"A simulated piezo stage, {record.input_units[0]} to {unit}: {record.samples} samples ")
+        + f"at {record.rate:g} Hz. What else its simulator put in, no model was told.\n"
     )
-    for note in result["notes"]:
-        screen.print(f"[yellow]note[/] {escape(note)}")
-    before, after = result["error"]["linear"], result["error"]["identified"]
-    unit = train.output_units[0]
+    plays, zones = (len(result["identified"][name][0]) for name in ("half_widths", "thresholds"))
     screen.print(
-        error_table(
-            {
-                "linear, fitted": before["train"],
-                "linear, held out": before["holdout"],
-                "with hysteresis, fitted": after["train"],
-                "with hysteresis, held out": after["holdout"],
-            },
-            unit,
-        )
+        f"[bold]1 Identify[/]  {zones} deadzones and {plays} plays before linear dynamics of order "
+        f"{result['identified']['order']}: on held-out data {before['rms']:.3g} {escape(unit)} rms, "
+        f"{100 * before['nrmse']:.2g} % of the span."
     )
-    ratio = before["holdout"]["rms"] / after["holdout"]["rms"]
-    screen.print(f"Held out, the error is {ratio:.1f} times smaller with hysteresis than without.")
+    chance = 1.96 / np.sqrt(record.samples)
+    screen.print(
+        f"[bold]2 What is left[/]  is no noise: neighbouring samples of the residual correlate by "
+        f"{result['left']['lag1']:.2f}, where white noise stays within ±{chance:.2f}."
+    )
+    screen.print("[bold]3 What is missing[/]")
+    for sentence in in_words(explanation, unit):
+        screen.print(f"  {escape(sentence)}")
+    screen.print("[bold]4 Before and after[/]")
+    screen.print(before_and_after(explanation, unit))
+    put_in = [
+        f"{name} ({truth['rms_over_noise'][name]:.3g} times the noise)" for name in sorted(truth["effects"])
+    ]
+    screen.print(
+        f"What the simulator had put in: {join(put_in)}, the hum at {truth['hum_hz']:g} Hz; noise of "
+        f"{truth['noise_rms_um']:.3g} {escape(unit)}. What is left held out is "
+        f"{after['rms'] / truth['noise_rms_um']:.2f} times that noise."
+    )
     say_written(screen, out, result["files"])
-
-
-def bundled(name: str) -> Record:
-    """Read a record that is part of the package."""
-    with as_file(files("gpi_hammerstein") / "data" / name) as path:
-        return read_record(path)
-
-
-def linear_output(linear: Fir, record: Record) -> NDArray[np.float64]:
-    """Return what a finite impulse response predicts for the first experiment, (samples,)."""
-    offset = float(np.ravel(linear.offsets)[0])
-    return np.ravel(linear.simulate(record.u[0])) + offset
-
-
-def linear_error(linear: Fir, record: Record) -> dict[str, float]:
-    """Return the error figures of a finite impulse response on a record of one output."""
-    y = record.y[0][:, 0]
-    error = y - linear_output(linear, record)
-    rms = float(np.sqrt(np.mean(error**2)))
-    return {
-        "rms": rms,
-        "nrmse": rms / float(np.ptp(y)),
-        "fit_percent": 100 * (1 - rms / float(np.std(y))),
-        "max": float(np.abs(error).max()),
-    }
-
-
-def draw_comparison(ax: "Axes", linear: Fir, model: Model, record: Record) -> None:
-    """Draw both residuals on one pair of axes."""
-    from gpi_hammerstein.plot.style import BLUE, ORANGE
-
-    t = np.arange(len(record.y[0])) / record.rate
-    before = record.y[0][:, 0] - linear_output(linear, record)
-    ax.plot(t, before, color=ORANGE, lw=0.8, label="linear alone")
-    ax.plot(t, model.residual(record)[0][:, 0], color=BLUE, lw=0.8, label="with hysteresis")
-    ax.set_xlabel("time [s]")
-    ax.set_ylabel(f"residual of {record.output_names[0]} [{record.output_units[0]}]")
-    ax.set_title("Another experiment of the same actuator")
-    ax.legend(loc="upper right")

@@ -1,11 +1,13 @@
 """`gpi explain`: what a record's model lacks, and the error before and after."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
 from rich.markup import escape
+from rich.table import Table
 
 import gpi_hammerstein._native as native
 from gpi_hammerstein import files
@@ -112,11 +114,7 @@ def explain(
     where = "blocks of time spread over the record" if other is None else f"another record: {holdout_record}"
     result |= {"holdout": where, "files": []}
     if out is not None:
-        with files.staged(out) as folder, working("drawing"):
-            write_pictures(folder, found)
-            files.save_model(found.model, folder / "model.json")
-            result["files"] = sorted([*(file.name for file in folder.iterdir()), "explanation.json"])
-            write_json(result, folder / "explanation.json")
+        write_results(out, found, result, "explanation.json")
     if as_json:
         print_json(result)
     else:
@@ -143,19 +141,32 @@ def summarise(screen: Console, result: dict[str, Any], unit: str, out: Path | No
     if result["interrupted"]:
         screen.print("[yellow]note[/] stopped before the search had finished; this is what was found so far")
     screen.print(f"Held out: {escape(result['holdout'])}")
-    before, after = result["error"]["before"], result["error"]["after"]
-    rows = {
-        "before, fitted": before["train"],
-        "before, held out": before["holdout"],
-        "after, fitted": after["train"],
-        "after, held out": after["holdout"],
-    }
-    screen.print(error_table(rows, unit))
+    screen.print(before_and_after(result, unit))
     for sentence in in_words(result, unit):
         screen.print(escape(sentence))
     if result["next_experiment"] and result["next_experiment"]["command"]:
         screen.print(f"  {escape(result['next_experiment']['command'])}")
     say_written(screen, out, result["files"])
+
+
+def before_and_after(result: Mapping[str, Any], unit: str) -> Table:
+    """Return the table of errors before and after, fitted and held out."""
+    names = {"train": "fitted", "holdout": "held out"}
+    rows = {
+        f"{when}, {names[part]}": result["error"][when][part]
+        for when in ("before", "after")
+        for part in ("train", "holdout")
+    }
+    return error_table(rows, unit)
+
+
+def write_results(out: Path, found: Explanation, result: dict[str, Any], name: str) -> None:
+    """Write model.json, pictures and `result` as the file `name` to a folder; note the files in `result`."""
+    with files.staged(out) as folder, working("drawing"):
+        write_pictures(folder, found)
+        files.save_model(found.model, folder / "model.json")
+        result["files"] = sorted([*(file.name for file in folder.iterdir()), name])
+        write_json(result, folder / name)
 
 
 def write_pictures(folder: Path, found: Explanation) -> None:

@@ -1,0 +1,90 @@
+"""The demonstration finds what its simulator put in, and its record can be made again."""
+
+import gzip
+import importlib.util
+import io
+import json
+import time
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import gpi_hammerstein as gpi
+from gpi_hammerstein.cli import run
+
+DATA = Path(gpi.__file__).parent / "data"
+SCRIPT = Path(__file__).parents[2] / "tools" / "make_demo_record.py"
+LONGEST = 60.0  # s, on a machine that does something else as well
+
+
+class Demonstration(NamedTuple):
+    """One run, for all tests: it takes a while."""
+
+    folder: Path
+    told: str
+    result: dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> Demonstration:
+    out = tmp_path_factory.mktemp("demo") / "out"
+    told = io.StringIO()
+    begin = time.perf_counter()
+    with redirect_stdout(told):
+        assert run(["demo", "-o", str(out)]) == 0
+    assert time.perf_counter() - begin < LONGEST
+    return Demonstration(out, told.getvalue(), json.loads((out / "demo.json").read_text()))
+
+
+def test_the_demonstration_names_what_was_put_in(shown: Demonstration) -> None:
+    result = shown.result
+    found, truth = result["explanation"], result["truth"]
+    assert sorted(found["effects"]) == sorted(truth["effects"])
+    assert found["verdict"] == "explained"
+    for part in ("train", "holdout"):
+        before, after = (found["error"][when][part]["rms"] for when in ("before", "after"))
+        assert after < 1.1 * truth["noise_rms_um"] < 0.25 * before
+    lines = [step["parameters"] for step in found["steps"] if step["effect"] == "periodic-disturbance"]
+    hum = lines[0]["frequency"]
+    assert abs(hum["value"] - truth["hum_hz"]) < 4 * hum["std"]
+    assert result["left"]["lag1"] > 0.5
+
+
+def test_the_demonstration_writes_model_json_and_pictures(shown: Demonstration) -> None:
+    folder, _, result = shown
+    assert sorted(file.name for file in folder.iterdir()) == result["files"]
+    assert {"demo.json", "model.json", "residual_time.png", "residual_spectrum.png"} <= set(result["files"])
+    model = gpi.load(folder / "model.json")
+    assert sorted({effect["name"] for effect in model.effects}) == sorted(result["explanation"]["effects"])
+    error = model.error(gpi.read_record(DATA / "demo.csv.gz"), fit_start=True)["rms"]
+    assert error < 1.1 * result["truth"]["noise_rms_um"]
+
+
+def test_the_demonstration_tells_its_story(shown: Demonstration) -> None:
+    told = shown.told
+    steps = ["1 Identify", "2 What is left", "3 What is missing", "4 Before and after", "had put in"]
+    places = [told.index(step) for step in steps]
+    assert places == sorted(places)
+    for words in ("creep", "periodic-disturbance", "Verdict: explained", "before, held out"):
+        assert words in told
+
+
+def rows(path: Path) -> NDArray[np.float64]:
+    return np.loadtxt(gzip.decompress(path.read_bytes()).decode().splitlines()[1:], delimiter=",")
+
+
+def test_the_record_is_made_again_exactly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = importlib.util.spec_from_file_location("make_demo_record", SCRIPT)
+    assert spec is not None and spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    monkeypatch.setattr(script, "DATA", tmp_path)
+    script.main()
+    assert (tmp_path / "demo.truth.json").read_bytes() == (DATA / "demo.truth.json").read_bytes()
+    again, bundled = (rows(path / "demo.csv.gz") for path in (tmp_path, DATA))
+    # other processors round the last digit otherwise
+    np.testing.assert_allclose(again, bundled, rtol=0, atol=1.5e-4)
