@@ -17,7 +17,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # The order of `make test` is part of what it promises, also under `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench figures monte-carlo scoreboard clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench figures monte-carlo scoreboard blind-exam clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -73,6 +73,9 @@ monte-carlo: $(NATIVE) ## Print errors over the Cramer-Rao bound and the coverag
 
 scoreboard: $(NATIVE) ## Print how often `explain` names the right effect; takes long
 	$(BIN)/python tools/scoreboard.py
+
+blind-exam: $(NATIVE) ## Write the answers on the blind records to docs/blind-exam.json; takes long
+	$(BIN)/python tools/blind_exam.py
 
 clean: ## Remove the environment, all builds and all caches
 	cargo clean

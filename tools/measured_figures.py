@@ -5,16 +5,18 @@ Run it from the project's root: `make figures`.
 """
 
 import json
-import os
+import sys
 import time
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-import gpi_hammerstein as gpi
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "tests"))
 
-DATA = Path(os.environ.get("GPI_DATA_DIR", "../shared"))
+import gpi_hammerstein as gpi  # noqa: E402
+from data_folder import DATA  # noqa: E402
+
 PIEZO_SPAN = 49.42  # um, of the full-scale record
 RIDGE = 3e-2  # what `identify` uses
 

@@ -1,11 +1,6 @@
-"""Real actuators: records that others measured and published.
-
-They are not part of the project. `GPI_DATA_DIR` names the folder that holds `measured` and `blind`;
-without it `../shared` beside the project is tried, and without that the tests are skipped.
-"""
+"""Real actuators: records that others measured and published."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 import gpi_hammerstein as gpi
+from data_folder import DEV, MEASURED, needs_measured
 from gpi_hammerstein.cli import run
 
 Array = NDArray[np.float64]
 
-SHARED = Path(os.environ.get("GPI_DATA_DIR") or Path(__file__).parents[3] / "shared")
-MEASURED = SHARED / "measured"
-BLIND = SHARED / "blind" / "dev"
-
-pytestmark = pytest.mark.skipif(
-    not MEASURED.is_dir(), reason=f"NO MEASURED RECORDS in {SHARED}: set GPI_DATA_DIR to run these tests"
-)
+pytestmark = needs_measured
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
@@ -131,9 +121,9 @@ def test_records_without_undeclared_effect_come_near_their_noise(
     number: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     name = f"record-{number:02d}"
-    noise = json.loads((BLIND / "labels.json").read_text())[name]["noise_std_um"]
-    again = BLIND / f"{name}.again.csv.gz"
-    record = BLIND / f"{name}.csv.gz"
+    noise = json.loads((DEV / "labels.json").read_text())[name]["noise_std_um"]
+    again = DEV / f"{name}.again.csv.gz"
+    record = DEV / f"{name}.csv.gz"
     error = call(capsys, "identify", record, "--holdout-record", again, "--fit-start")["error"]["holdout"]
     floor = noise * error["nrmse"] / error["rms"]
     show(
