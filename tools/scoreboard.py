@@ -7,52 +7,27 @@ plants of the tests' own simulator, drawn at random. `python tools/scoreboard.py
 import argparse
 import json
 import os
+import shlex
 import sys
-import time
-from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "tests"))
 
-import gpi_hammerstein as gpi  # noqa: E402
 import plants  # noqa: E402  the simulator that the tests use
+import score_tables  # noqa: E402
+from data_folder import DEV  # noqa: E402
+from gpi_hammerstein.files import write_atomically  # noqa: E402
+from scores import Result, labelled, simulated  # noqa: E402
 
-# What the labels call effects that the catalogue has under another name.
-ALSO = {"duffing": "stiffness", "preisach": "hysteresis-shape"}
 # Effects of the plants that are drawn one at a time; G's order and delay belong to the declared model here.
 SINGLE = [name for name in plants.CATALOGUE if name not in ("delay", "linear-dynamics")]
+POWER_STRENGTHS = (0.2, 0.5, 1.0, 2.0, 3.0)  # rms over that of the noise
 
-
-@dataclass
-class Result:
-    """One record explained: errors over the noise."""
-
-    name: str
-    wanted: tuple[str, ...]
-    found: tuple[str, ...]
-    verdict: str
-    before: float
-    after: float
-    again: float
-    seconds: float
-
-    def is_right(self) -> bool:
-        """Whether the effects are those of the label."""
-        return sorted(self.wanted) == sorted(self.found)
-
-    def line(self) -> str:
-        """One line of the table."""
-        return (
-            f"{'  ' if self.is_right() else '! '}{self.name:34s} {', '.join(self.wanted) or '-':44s} "
-            f"{', '.join(self.found) or '-':44s} {self.verdict:16s} {self.before:8.2f} {self.after:6.2f} "
-            f"{self.again:6.2f} {self.seconds:6.1f} s"
-        )
-
+Job = tuple[Callable[..., Result], tuple[object, ...]]
 
 HEAD = (
     f"  {'record':34s} {'wanted':44s} {'found':44s} {'verdict':16s} {'before':>8s} {'after':>6s} "
@@ -60,50 +35,21 @@ HEAD = (
 )
 
 
-def explained(
-    name: str, wanted: tuple[str, ...], record: gpi.Record, again: gpi.Record, noise: float
-) -> Result:
-    """Explain a record and score the model on another experiment of the same plant."""
-    begin = time.perf_counter()
-    found = gpi.explain(record)
-    seconds = time.perf_counter() - begin
-    error = found.model.error(again, fit_start=True)["rms"]
-    before, after = (errors["holdout"]["rms"] / noise for errors in (found.before, found.after))
-    effects = tuple(found.effects)
-    return Result(name, wanted, effects, found.verdict, before, after, error / noise, seconds)
+def line(result: Result) -> str:
+    """One record's line below `HEAD`."""
+    name = result.name if result.strength is None else f"{result.name} at {result.strength:g}"
+    return (
+        f"{'  ' if result.is_right() else '! '}{name:34s} {', '.join(result.wanted) or '-':44s} "
+        f"{', '.join(result.found) or '-':44s} {result.verdict:16s} {result.before:8.2f} {result.after:6.2f} "
+        f"{result.again:6.2f} {result.seconds:6.1f} s"
+    )
 
 
-def labelled(folder: str, name: str) -> Result:
-    """Explain one record of the data folder."""
-    label = json.loads((Path(folder) / "labels.json").read_text())[name]
-    wanted = tuple(ALSO.get(effect, effect) for effect in label["effects"])
-    record, again = (gpi.read_record(Path(folder) / f"{name}{part}.csv.gz") for part in ("", ".again"))
-    return explained(name, wanted, record, again, label["noise_std_um"])
-
-
-def simulated(seed: int, effects: tuple[str, ...], strength: float | None, seconds: float) -> Result:
-    """Explain one record of the simulator."""
-    plant = plants.draw(seed, effects, strength, seconds)
-    record, again = (as_record(plant.record(number)) for number in (0, 1))
-    unnamed = any(effect in plants.OUTSIDE or effect == "unattributed" for effect in effects)
-    wanted = () if unnamed else effects
-    name = f"plant {seed} {'+'.join(plant.effects) if unnamed else ''}"
-    return explained(name, wanted, record, again, plant.noise_std)
-
-
-def as_record(run: plants.Recording) -> gpi.Record:
-    """Return a simulated recording as the package reads one."""
-    columns = {} if run.x is None else {"covariates": run.x}
-    return gpi.Record(run.u, run.y, rate=run.rate, input_units=["V"], output_units=["um"], **columns)
-
-
-def work(arguments: argparse.Namespace) -> Iterator[tuple[object, ...]]:
-    """Yield what to do: a function and its arguments."""
-    root = Path(os.environ.get("GPI_DATA_DIR", Path(__file__).resolve().parents[2] / "shared"))
-    folder = root / "blind" / "dev"
-    if arguments.records and (folder / "labels.json").exists():
-        for name in sorted(json.loads((folder / "labels.json").read_text())):
-            yield labelled, str(folder), name
+def mixed_work(arguments: argparse.Namespace) -> Iterator[Job]:
+    """Yield the labelled records and plants with none, one, two, three or foreign effects."""
+    if arguments.records and (DEV / "labels.json").exists():
+        for name in sorted(json.loads((DEV / "labels.json").read_text())):
+            yield labelled, (DEV, name)
     random = np.random.default_rng(arguments.seed)
     for number in range(arguments.plants):
         kind = number % 10
@@ -113,22 +59,33 @@ def work(arguments: argparse.Namespace) -> Iterator[tuple[object, ...]]:
             effects = ("unattributed",)
         else:
             count = 1 if kind < 7 else kind - 5
-            effects = tuple(str(name) for name in random.choice(SINGLE, count, replace=False))
-        yield simulated, arguments.seed + number, effects, arguments.strength, arguments.seconds
+            count = min(count, len(arguments.effects))
+            effects = tuple(str(name) for name in random.choice(arguments.effects, count, replace=False))
+        yield simulated, (arguments.seed + number, effects, arguments.strength, arguments.seconds)
 
 
-def confusion(results: list[Result]) -> None:
-    """Print how often each single effect was found, and what was found instead."""
-    print("\nsingle effects: wanted -> found")
-    table: dict[str, Counter[str]] = {}
-    for result in results:
-        if len(result.wanted) <= 1:
-            wanted = result.wanted[0] if result.wanted else "none"
-            table.setdefault(wanted, Counter())[", ".join(sorted(result.found)) or "none"] += 1
-    for wanted, found in sorted(table.items()):
-        total, right = found.total(), found[wanted]
-        others = "; ".join(f"{count} x {name}" for name, count in found.most_common() if name != wanted)
-        print(f"  {wanted:22s} {right:3d} of {total:3d}   {others}")
+def power_work(arguments: argparse.Namespace) -> Iterator[Job]:
+    """Yield every single effect at every strength on a few plants."""
+    for name in arguments.effects:
+        for strength in POWER_STRENGTHS:
+            for number in range(arguments.power_seeds):
+                yield simulated, (arguments.seed + number, (name,), strength, arguments.seconds)
+
+
+def run(pool: ProcessPoolExecutor, work: Iterable[Job]) -> list[Result]:
+    """Do the work, printing one line a record in the order of the work."""
+    jobs = [pool.submit(function, *values) for function, values in work]
+    results = []
+    for job in jobs:
+        results.append(job.result())
+        print(line(results[-1]), flush=True)
+    return results
+
+
+def as_markdown(tables: Iterable[score_tables.Table]) -> str:
+    """Return the tables below the command that made them."""
+    command = shlex.join(["python", "tools/scoreboard.py", *sys.argv[1:]])
+    return "\n".join([f"# Scoreboard\n\nMade by `{command}`.\n", *(table.markdown() for table in tables)])
 
 
 def main() -> None:
@@ -139,30 +96,30 @@ def main() -> None:
     parser.add_argument("--strength", type=float, default=None, help="rms of every effect over the noise")
     parser.add_argument("--seconds", type=float, default=30.0, help="length of the simulated records")
     parser.add_argument("--no-records", dest="records", action="store_false", help="plants alone")
+    parser.add_argument(
+        "--effects", nargs="+", choices=SINGLE, default=SINGLE, metavar="EFFECT", help="draw these alone"
+    )
+    parser.add_argument("--power", action="store_true", help="single effects near the noise as well")
+    parser.add_argument("--power-seeds", type=int, default=3, help="plants an effect and strength")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="such as docs/scoreboard.md")
     arguments = parser.parse_args()
     print(HEAD, flush=True)
-    results = []
     with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
-        jobs = [pool.submit(*job) for job in work(arguments)]  # type: ignore[arg-type]
-        for job in jobs:
-            result: Result = job.result()  # type: ignore[assignment]
-            results.append(result)
-            print(result.line(), flush=True)
-    confusion(results)
-    right = [result for result in results if result.is_right()]
-    clean = [result for result in results if not result.wanted]
-    print(f"\nright: {len(right)} of {len(results)}")
-    print(f"false alarms where nothing is to be found: {sum(bool(r.found) for r in clean)} of {len(clean)}")
-    if right:
-        ratios = np.array([result.after for result in right])
-        print(
-            f"held-out error over the noise, where right: median {np.median(ratios):.3f}, "
-            f"worst {ratios.max():.3f}"
-        )
-        print(
-            f"time: median {np.median([r.seconds for r in results]):.1f} s, "
-            f"longest {max(r.seconds for r in results):.1f} s"
-        )
+        mixed = run(pool, mixed_work(arguments))
+        near_noise = run(pool, power_work(arguments) if arguments.power else [])
+    tables = []
+    if mixed:
+        tables += [score_tables.singles(mixed), score_tables.by_number(mixed), score_tables.summary(mixed)]
+    if near_noise:
+        tables.append(score_tables.power(near_noise))
+    for table in tables:
+        print(table.text())
+    seconds = [result.seconds for result in (*mixed, *near_noise)]
+    if seconds:
+        print(f"\ntime: median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s")
+    if arguments.markdown is not None:
+        arguments.markdown.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(arguments.markdown, as_markdown(tables))
 
 
 if __name__ == "__main__":

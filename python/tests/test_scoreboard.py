@@ -1,0 +1,82 @@
+"""The scoreboard counts what it says."""
+
+import pytest
+
+import score_tables
+from scores import Result
+
+
+def result(
+    wanted: str, found: str, *, strength: float | None = None, after: float = 1.0, is_outside: bool = False
+) -> Result:
+    """One answer; effects are joined by spaces."""
+    names = (tuple(wanted.split()), tuple(found.split()))
+    return Result("plant", *names, "explained", 5.0, after, 1.0, 1.0, is_outside, strength)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "found", "kind"),
+    [
+        ("", "", "right"),
+        ("creep drift", "drift creep", "right"),
+        ("creep drift", "drift", "partly right"),
+        ("creep drift", "", "nothing found"),
+        ("creep drift", "creep backlash", "wrong"),
+        ("", "creep", "wrong"),
+    ],
+)
+def test_an_answer_is_of_one_kind(wanted: str, found: str, kind: str) -> None:
+    assert result(wanted, found).kind() == kind
+
+
+def test_answers_are_counted_by_the_number_of_effects() -> None:
+    results = [
+        result("", ""),
+        result("creep", "creep"),
+        result("creep", "drift"),
+        result("creep drift", "drift"),
+        result("", "creep", is_outside=True),
+    ]
+    table = score_tables.by_number(results)
+    assert table.heads == ("effects", "right", "partly right", "nothing found", "wrong", "records")
+    assert list(table.rows) == [
+        ("0", "1", "0", "0", "0", "1"),
+        ("1", "1", "0", "0", "1", "2"),
+        ("2", "0", "1", "0", "0", "1"),
+        ("outside the catalogue", "0", "0", "0", "1", "1"),
+    ]
+
+
+def test_power_is_the_share_found_right_and_false_per_strength() -> None:
+    results = [
+        result("creep", "", strength=0.5),
+        result("creep", "drift", strength=0.5),
+        result("creep", "creep", strength=2.0),
+        result("creep", "creep drift", strength=2.0),
+        result("drift", "drift", strength=2.0),
+        result("creep drift", "creep", strength=2.0),
+    ]
+    table = score_tables.power(results)
+    assert table.heads == ("effect", "0.5", "2")
+    assert list(table.rows) == [
+        ("creep", "0 / 0 / 50", "100 / 50 / 50"),
+        ("drift", "-", "100 / 100 / 0"),
+        ("all", "0 / 0 / 50", "100 / 67 / 33"),
+    ]
+
+
+def test_single_effects_and_the_summary() -> None:
+    results = [result("creep", "creep", after=1.5), result("creep", "drift"), result("", "")]
+    assert list(score_tables.singles(results).rows) == [
+        ("creep", "1 of 2", "1 x drift"),
+        ("none", "1 of 1", ""),
+    ]
+    figures = {row[0]: row[1] for row in score_tables.summary(results).rows}
+    assert figures["right"] == "2 of 3"
+    assert figures["held-out error over the noise, where right"] == "median 1.250, worst 1.500"
+
+
+def test_a_table_as_text_and_as_markdown() -> None:
+    table = score_tables.Table("Title", ("a", "long head"), [("cell of a", "1")])
+    assert table.text() == "\nTitle\n  a          long head\n  cell of a  1"
+    assert table.markdown() == "## Title\n\n| a | long head |\n| --- | --- |\n| cell of a | 1 |\n"

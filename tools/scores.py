@@ -1,0 +1,97 @@
+"""What `explain` answers on one record whose effects are known, and how right that is."""
+
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import gpi_hammerstein as gpi
+import plants
+
+# What the labels call effects that the catalogue has under another name.
+ALSO = {"duffing": "stiffness", "preisach": "hysteresis-shape"}
+
+
+@dataclass(frozen=True)
+class Result:
+    """One record explained: errors over the noise; `strength` is that of a single effect, if it was given."""
+
+    name: str
+    wanted: tuple[str, ...]
+    found: tuple[str, ...]
+    verdict: str
+    before: float
+    after: float
+    again: float
+    seconds: float
+    is_outside: bool = False
+    strength: float | None = None
+
+    def is_right(self) -> bool:
+        """Whether the effects are those of the label."""
+        return sorted(self.wanted) == sorted(self.found)
+
+    def has_false(self) -> bool:
+        """Whether an effect was found that is not there."""
+        return not set(self.found) <= set(self.wanted)
+
+    def kind(self) -> str:
+        """How right the answer is: right, partly right, nothing found, or wrong."""
+        if self.is_right():
+            return "right"
+        if self.has_false():
+            return "wrong"
+        return "partly right" if self.found else "nothing found"
+
+
+def explained(
+    name: str,
+    wanted: tuple[str, ...],
+    record: gpi.Record,
+    again: gpi.Record,
+    noise: float,
+    *,
+    is_outside: bool = False,
+    strength: float | None = None,
+) -> Result:
+    """Explain a record and score the model on another experiment of the same plant."""
+    begin = time.perf_counter()
+    found = gpi.explain(record)
+    seconds = time.perf_counter() - begin
+    error = found.model.error(again, fit_start=True)["rms"]
+    before, after = (errors["holdout"]["rms"] / noise for errors in (found.before, found.after))
+    return Result(
+        name,
+        wanted,
+        tuple(found.effects),
+        found.verdict,
+        before,
+        after,
+        error / noise,
+        seconds,
+        is_outside,
+        strength,
+    )
+
+
+def labelled(folder: Path, name: str) -> Result:
+    """Explain one record of the data folder."""
+    label = json.loads((folder / "labels.json").read_text())[name]
+    wanted = tuple(ALSO.get(effect, effect) for effect in label["effects"])
+    record, again = (gpi.read_record(folder / f"{name}{part}.csv.gz") for part in ("", ".again"))
+    return explained(name, wanted, record, again, label["noise_std_um"])
+
+
+def simulated(seed: int, effects: tuple[str, ...], strength: float | None, seconds: float) -> Result:
+    """Explain one record of the simulator."""
+    plant = plants.draw(seed, effects, strength, seconds)
+    record, again = (as_record(plant.record(number)) for number in (0, 1))
+    is_outside = any(effect in plants.OUTSIDE or effect == "unattributed" for effect in effects)
+    wanted = () if is_outside else effects
+    name = f"plant {seed} {'+'.join(plant.effects) if is_outside else ''}".strip()
+    return explained(name, wanted, record, again, plant.noise_std, is_outside=is_outside, strength=strength)
+
+
+def as_record(run: plants.Recording) -> gpi.Record:
+    """Return a simulated recording as the package reads one."""
+    return gpi.Record(run.u, run.y, rate=run.rate, covariates=run.x, input_units=["V"], output_units=["um"])
