@@ -70,6 +70,10 @@ def test_the_demonstration_tells_its_story(shown: Demonstration) -> None:
     assert places == sorted(places)
     for words in ("creep", "periodic-disturbance", "Verdict: explained", "before, held out"):
         assert words in told
+    lines = [
+        step for step in shown.result["explanation"]["steps"] if step["effect"] == "periodic-disturbance"
+    ]
+    assert told.count("periodic-disturbance (one more)") == len(lines) - 1 > 0
 
 
 def rows(path: Path) -> NDArray[np.float64]:
