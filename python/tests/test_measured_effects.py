@@ -75,7 +75,7 @@ def plain(piezo: tuple[Array, Array]) -> gpi.Explanation:
 def test_the_plain_record_creeps(plain: gpi.Explanation) -> None:
     # its makers' figures show the cycle's mean settling
     assert "creep" in plain.effects
-    assert plain.after["holdout"]["rms"] < 0.7 * plain.before["holdout"]["rms"]
+    assert plain.after["holdout"]["rms"] < 0.8 * plain.before["holdout"]["rms"]
 
 
 CASES = [
