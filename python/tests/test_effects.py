@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.polynomial import Legendre
 
 import gpi_hammerstein as gpi
 import oracle
@@ -167,8 +168,13 @@ CURVES = np.array([[0.02, -0.1, 0.05, 0.01], [0.03, 0.02, -0.04, 0.02]])
 
 
 def shaped(r, f):
-    powers = [(f / 2.5) ** m * (r / 1.3) ** n * CURVES[m - 1, n] for m in (1, 2) for n in range(4)]
-    return f * (1 + sum(powers))
+    """F + s q, dq/df of Legendre's polynomials of the place and the half-width; q from its integral."""
+    if r == 0:
+        return f
+    x = np.clip((f - 0.3) / 2.5, -1, 1)
+    widths = [Legendre.basis(b)(min(2 * r / 1.3 - 1, 1.0)) for b in range(4)]
+    density = Legendre([0.0, *(CURVES @ widths)])
+    return f + 2.5 * (density.integ()(x) - density.integ()(-1.0))
 
 
 CASES = {
@@ -179,7 +185,14 @@ CASES = {
         {"width": lambda r, s: r * (1 + 2e-3 * s) + (5e-4 * s if r > 0 else 0), "speed_seen": bent},
     ),
     "hysteresis-shape": (
-        {"input": 0, "coefficients": CURVES.ravel().tolist(), "scale": 2.5, "widest": 1.3},
+        {
+            "input": 0,
+            "coefficients": CURVES.ravel().tolist(),
+            "widths": 4,
+            "middle": 0.3,
+            "scale": 2.5,
+            "widest": 1.3,
+        },
         {"read": shaped},
     ),
     "linear-dynamics": (

@@ -115,6 +115,20 @@ impl Model {
         drive
     }
 
+    /// What plays that stand are read as; `v` without effects.
+    pub(crate) fn read_plays(&self, input: usize, state: &GpiState<f64, Vec<f64>>, v: f64) -> f64 {
+        let effects = self.effects.iter().map(Effect::block);
+        let blocks: Vec<&dyn Block> =
+            effects.filter(|block| block.reads() && block.channel() == input).collect();
+        if blocks.is_empty() {
+            return v;
+        }
+        let bank = self.hysteresis()[input].plays();
+        let plays = bank.half_widths().iter().zip(bank.weights()).zip(state.plays.plays());
+        let read = |r, place| blocks.iter().fold(place, |place, block| block.read(r, place).0);
+        plays.map(|((&r, weight), &place)| weight * read(r, place)).sum()
+    }
+
     /// v of one input, with the effects on its plays.
     pub(crate) fn play_from(
         &self,

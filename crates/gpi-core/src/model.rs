@@ -141,6 +141,9 @@ impl Model {
             *v = hysteresis.step(&mut state, value);
             states.push(state);
         }
+        for (input, (state, v)) in states.iter().zip(driven.iter_mut()).enumerate() {
+            *v = self.read_plays(input, state, *v);
+        }
         let mut state = ModelState {
             hysteresis: states,
             linear: self.linear.equilibrium(&driven),

@@ -155,6 +155,11 @@ pub trait Block {
         false
     }
 
+    /// Plays: adds the derivatives of [`Block::read`] by the values, times `weight`, to `slopes`.
+    fn read_slopes(&self, half_width: f64, place: f64, weight: f64, slopes: &mut [f64]) {
+        let _ = (half_width, place, weight, slopes);
+    }
+
     /// Dynamics: sections beside G, each with denominator `1, a1, ..` and numerator `b1, ..`, in powers of
     /// the delay.
     fn sections(&self, rate: f64) -> Vec<(Vec<f64>, Vec<f64>)> {

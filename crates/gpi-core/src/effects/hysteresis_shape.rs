@@ -2,26 +2,31 @@
 
 use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
-/// Plays read through curves: `v = sum_i p_i F_i (1 + q(F_i / s, r_i / R))` with
-/// `q(f, r) = sum_m sum_l c_ml f^m r^l`, m = 1, 2 and l = 0 .. 3.
+/// Plays read through curves: `v = sum_i p_i (F_i + s q(f_i, r_i))` with `f_i = (F_i - m) / s` and
+/// `dq/df = sum_a sum_b c_ab P_a(f) P_b(2 r / R - 1)`, a = 1 .. A, b = 0 .. B - 1, P Legendre's
+/// polynomials, q = 0 at both ends of the plays' range and beyond. The play of half-width 0 is read as it
+/// is: its curve is the envelope's.
 ///
-/// Sums of curves of plays are the Preisach operators (its density over the half-plane of thresholds is
-/// the curves' second derivative), whose minor loops change with their place. The declared hysteresis
-/// is q = 0.
+/// Sums of curves of plays are the Preisach operators (1 + dq/df is their density over the half-plane of
+/// thresholds), whose minor loops change with their place. The declared hysteresis is q = 0.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HysteresisShape {
     /// The input whose hysteresis it is.
     pub input: usize,
-    /// c_ml, `[m][l]` one row after the other.
+    /// c_ab, `[a][b]` one row after the other.
     pub coefficients: Vec<f64>,
-    /// s, half the span of the plays' input.
+    /// B.
+    pub widths: usize,
+    /// m, the middle of the plays' range.
+    pub middle: f64,
+    /// s, half their range.
     pub scale: f64,
     /// R, half-width of the widest play.
     pub widest: f64,
 }
 
-const POWERS: usize = 2;
-const WIDTHS: usize = 4;
+/// The largest A and B.
+const MOST: usize = 10;
 
 impl HysteresisShape {
     pub(super) const NAME: &'static str = "hysteresis-shape";
@@ -32,14 +37,48 @@ impl HysteresisShape {
     pub(super) const REPEATS: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
-        let block = |input: usize| {
-            let (low, high) = Situation::range(situation.drives, input);
-            let (scale, widest) = (0.5 * (high - low), situation.widest[input]);
-            Self { input, coefficients: vec![0.0; POWERS * WIDTHS], scale, widest }
-        };
-        let usable = |block: &Self| block.scale > 0.0 && block.widest > 0.0;
-        let blocks = situation.inputs().map(block).filter(usable);
-        blocks.map(|block| Candidate::linear(block, 0..POWERS * WIDTHS)).collect()
+        /// A and B.
+        const SIZES: [(usize, usize); 2] = [(2, 3), (7, 5)];
+        let mut candidates = Vec::new();
+        for input in situation.inputs() {
+            let ((low, high), widest) = (situation.places[input], situation.widest[input]);
+            let (middle, scale) = (0.5 * (low + high), 0.5 * (high - low));
+            if scale <= 0.0 || widest <= 0.0 {
+                continue;
+            }
+            for (degrees, widths) in SIZES {
+                let coefficients = vec![0.0; degrees * widths];
+                let block = Self { input, coefficients, widths, middle, scale, widest };
+                candidates.push(Candidate::linear(block, 0..degrees * widths));
+            }
+        }
+        candidates
+    }
+
+    /// Legendre's polynomials P_0, P_1, ..
+    fn legendre(x: f64) -> [f64; MOST + 2] {
+        let mut values = [1.0; MOST + 2];
+        values[1] = x;
+        for n in 1..=MOST {
+            let m = n as f64;
+            values[n + 1] = ((2.0 * m + 1.0) * x * values[n] - m * values[n - 1]) / (m + 1.0);
+        }
+        values
+    }
+
+    fn by_width(&self, half_width: f64) -> [f64; MOST + 2] {
+        Self::legendre((2.0 * half_width / self.widest - 1.0).clamp(-1.0, 1.0))
+    }
+
+    /// P_a integrated from -1, and P_a itself, at a place.
+    fn by_place(&self, place: f64) -> impl Iterator<Item = (f64, f64)> {
+        let f = (place - self.middle) / self.scale;
+        let values = Self::legendre(f.clamp(-1.0, 1.0));
+        let inside = if f.abs() < 1.0 { 1.0 } else { 0.0 };
+        (1..=MOST).map(move |a| {
+            let integral = (values[a + 1] - values[a - 1]) / (2 * a + 1) as f64;
+            (integral, inside * values[a])
+        })
     }
 }
 
@@ -69,24 +108,40 @@ impl Block for HysteresisShape {
     }
 
     fn quantities(&self, _: Units) -> Vec<Quantity> {
-        let name = |place: usize| format!("curve[{}][{}]", 1 + place / WIDTHS, place % WIDTHS);
+        let name =
+            |place: usize| format!("density[{}][{}]", 1 + place / self.widths, place % self.widths);
         let values = self.coefficients.iter().enumerate();
         values.map(|(place, &value)| Quantity::new(name(place), "", value)).collect()
     }
 
     fn read(&self, half_width: f64, place: f64) -> (f64, f64) {
-        let (f, r) = (place / self.scale, half_width / self.widest);
-        let (mut curve, mut derivative) = (0.0, 0.0);
-        for (m, row) in self.coefficients.chunks_exact(WIDTHS).enumerate() {
-            let by_width = row.iter().rev().fold(0.0, |sum, c| sum * r + c);
-            let power = f.powi(1 + m as i32);
-            curve += by_width * power;
-            derivative += (2 + m) as f64 * by_width * power;
+        if half_width == 0.0 {
+            return (place, 1.0);
         }
-        (place * (1.0 + curve), 1.0 + derivative)
+        let by_width = self.by_width(half_width);
+        let (mut curve, mut density) = (0.0, 0.0);
+        for (row, (integral, own)) in
+            self.coefficients.chunks_exact(self.widths).zip(self.by_place(place))
+        {
+            let weight: f64 = row.iter().zip(&by_width).map(|(c, p)| c * p).sum();
+            curve += weight * integral;
+            density += weight * own;
+        }
+        (place + self.scale * curve, 1.0 + density)
     }
 
     fn reads(&self) -> bool {
         true
+    }
+
+    fn read_slopes(&self, half_width: f64, place: f64, weight: f64, slopes: &mut [f64]) {
+        if half_width == 0.0 {
+            return;
+        }
+        let by_width = self.by_width(half_width);
+        for (row, (integral, _)) in slopes.chunks_exact_mut(self.widths).zip(self.by_place(place)) {
+            let factor = weight * self.scale * integral;
+            row.iter_mut().zip(&by_width).for_each(|(slope, p)| *slope += factor * p);
+        }
     }
 }

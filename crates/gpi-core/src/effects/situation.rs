@@ -16,6 +16,8 @@ pub(crate) struct Situation<'a> {
     pub order: usize,
     /// Half-width of the widest play of each input.
     pub widest: Vec<f64>,
+    /// The range of the plays' input, one an input.
+    pub places: Vec<(f64, f64)>,
 }
 
 /// A block that the search tries: its columns are what the output gains by each probe.

@@ -2,10 +2,11 @@
 
 use super::score::{Base, LEFT, Projection};
 use crate::effects::Stage;
+use crate::identify::free_run::Signals;
 use crate::identify::point::{Point, range};
 use crate::identify::preparation::Prepared;
 use crate::identify::refine::RefineOptions;
-use crate::{Error, Matrix};
+use crate::{Error, Experiment, Matrix};
 use nalgebra::DVector;
 
 /// A play or a deadzone that an input's hysteresis may get.
@@ -38,9 +39,14 @@ pub(crate) fn enriched(
     /// A weight beside which the output changes linearly.
     const PROBE: f64 = 1e-4;
     let places = places(base, prepared, moving);
-    let probes: Vec<(Point, Stage)> =
-        places.iter().map(|place| (place.added_to(base.point, PROBE), Stage::Plays)).collect();
-    let Projection { mut left, mut score, squares, cost } = base.project(&probes)?;
+    let columns = |known: &Signals, here: &Matrix, experiment: &Experiment, index: usize| {
+        let column = |place: &Place| {
+            let point = place.added_to(base.point, PROBE);
+            Ok(point.output_from(Stage::Plays, known, experiment, index)? - here)
+        };
+        places.iter().map(column).collect()
+    };
+    let Projection { mut left, mut score, squares, cost } = base.project(places.len(), &columns)?;
     let chance = (2.0 * prepared.values().ln() / prepared.values()).max(LEAST) * cost;
     let mut point = base.point.clone();
     let mut added = 0;

@@ -10,6 +10,7 @@
 
 mod blocks;
 mod grid;
+mod lags;
 mod noise;
 mod residual;
 mod score;
@@ -158,6 +159,7 @@ pub fn explain(
         Err(Error::Interrupted) => true,
         other => other.map(|()| false)?,
     };
+    search.settle_lags()?;
     let mut patient = |_: &str, _: f64| true;
     let last: Progress = if interrupted { &mut patient } else { progress };
     let refinement = finish(&mut search, interrupted, last)?;

@@ -6,7 +6,7 @@ use crate::identify::linearization::{Linearization, Weighting};
 use crate::identify::point::{Freedom, Point};
 use crate::identify::stream::Stream;
 use crate::identify::uncertainty::descending_eigen;
-use crate::{Error, Matrix, Record};
+use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::DVector;
 
 /// A candidate's score.
@@ -14,6 +14,8 @@ use nalgebra::DVector;
 pub(crate) struct Score {
     /// The block with the values that the score test gives it.
     pub start: Effect,
+    /// The block without effect, where it may start from there.
+    pub zero: Option<Effect>,
     /// The part of the residual's sum of squares that it would take, 0 to 1.
     pub gain: f64,
     /// Columns that the base model does not absorb.
@@ -113,9 +115,14 @@ impl<'a> Base<'a> {
             let used = channel.half_widths.iter().zip(&channel.weights).filter(|(_, p)| **p > 0.0);
             used.map(|(r, _)| *r).fold(0.0, f64::max)
         });
+        let drives = select(|signals| &signals.drive);
+        let places = self.point.channels.iter().enumerate().map(|(input, channel)| {
+            channel.envelope_range(drives.iter().flat_map(|drive| drive.column(input)).copied())
+        });
         ask(&Situation {
+            places: places.collect(),
             record: self.record,
-            drives: &select(|signals| &signals.drive),
+            drives: &drives,
             displacements: &select(|signals| &signals.displacement),
             residuals: &self.residuals,
             order: self.point.dynamics.own().order(),
@@ -125,11 +132,15 @@ impl<'a> Base<'a> {
 
     /// Scores of a few candidates.
     fn score(&self, candidates: &[Candidate]) -> Result<Vec<Score>, Error> {
-        let probes = candidates.iter().flat_map(|candidate| &candidate.probes);
-        let probes: Vec<(Point, Stage)> = probes
-            .map(|probe| (self.point.with_effect(probe.clone()), probe.block().stage()))
-            .collect();
-        let Projection { left, score, squares, cost } = self.project(&probes)?;
+        let probes = candidates.iter().map(|candidate| candidate.probes.len()).sum();
+        let columns = |known: &Signals, here: &Matrix, experiment: &Experiment, index: usize| {
+            let mut columns = Vec::new();
+            for candidate in candidates {
+                columns.extend(self.columns(candidate, known, here, experiment, index)?);
+            }
+            Ok(columns)
+        };
+        let Projection { left, score, squares, cost } = self.project(probes, &columns)?;
         let mut found = Vec::new();
         let mut first = 0;
         for candidate in candidates {
@@ -147,29 +158,49 @@ impl<'a> Base<'a> {
             }
             let columns = places.len();
             let start = candidate.start(&coefficients);
-            found.push(Score { start, gain: gain.clamp(0.0, 1.0), columns });
+            let zero = candidate.linear.then(|| candidate.block.clone());
+            found.push(Score { start, zero, gain: gain.clamp(0.0, 1.0), columns });
             first += candidate.probes.len();
         }
         Ok(found)
     }
 
-    /// What other points, which differ from a stage of the chain on, add to the output, projected off the
-    /// base model's own sensitivities.
-    pub(crate) fn project(&self, probes: &[(Point, Stage)]) -> Result<Projection, Error> {
-        let (n, unknowns) = (probes.len(), self.linearization.layout.len);
+    /// What the output gains by each probe of a candidate; `here` is the output.
+    fn columns(
+        &self,
+        candidate: &Candidate,
+        known: &Signals,
+        here: &Matrix,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Vec<Matrix>, Error> {
+        let block = candidate.block.block();
+        if candidate.linear && block.reads() {
+            let point = self.point.with_effect(candidate.block.clone());
+            let Some(place) = point.effects.iter().position(|own| *own == candidate.block) else {
+                return Ok(Vec::new());
+            };
+            let columns = point.columns_of(place, known, here, experiment, index)?;
+            return Ok(columns.into_iter().zip(block.steps()).map(|(c, step)| c * step).collect());
+        }
+        let column = |probe: &Effect| {
+            let (point, stage) = (self.point.with_effect(probe.clone()), probe.block().stage());
+            Ok(point.output_from(stage, known, experiment, index)? - here)
+        };
+        candidate.probes.iter().map(column).collect()
+    }
+
+    /// So many columns beside the model's own, projected off its sensitivities. `columns` makes them for an
+    /// experiment from the signals and the output, and its place.
+    pub(crate) fn project(&self, n: usize, columns: Columns) -> Result<Projection, Error> {
+        let unknowns = self.linearization.layout.len;
         let mut cross = Matrix::zeros(unknowns, n);
         let mut squares = Matrix::zeros(n, n);
         let mut with_residual = DVector::zeros(n);
         for (index, experiment) in self.record.experiments().iter().enumerate() {
             let known = &self.signals[index];
-            let base = self.point.output_from(Stage::Added, known, experiment, index)?;
-            let columns: Result<Vec<Matrix>, Error> = probes
-                .iter()
-                .map(|(point, stage)| {
-                    Ok(point.output_from(*stage, known, experiment, index)? - &base)
-                })
-                .collect();
-            let columns = columns?;
+            let here = self.point.output_from(Stage::Added, known, experiment, index)?;
+            let columns = columns(known, &here, experiment, index)?;
             let places: Vec<usize> = experiment.scored_runs().flatten().collect();
             let mut first = 0;
             let derivatives = self.freedom.derivatives;
@@ -206,6 +237,9 @@ impl<'a> Base<'a> {
         })
     }
 }
+
+/// Makes columns (samples, outputs) of an experiment.
+type Columns<'a> = &'a dyn Fn(&Signals, &Matrix, &Experiment, usize) -> Result<Vec<Matrix>, Error>;
 
 /// A column of which a smaller part is left is the base model's own.
 pub(crate) const LEFT: f64 = 1e-7;

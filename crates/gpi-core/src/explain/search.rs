@@ -1,6 +1,7 @@
 //! The closed loop: score candidates, fit the best few jointly, keep what the held-out data confirm.
 
 use super::grid::enriched;
+use super::lags::Before;
 use super::score::{Base, Score, scores};
 use crate::effects::{CATALOGUE, Candidate, Entry, Stage};
 use crate::identify::levenberg_marquardt::{FitOptions, Fitted, fit};
@@ -65,7 +66,9 @@ pub(crate) struct Search<'a> {
     /// Which grids may move and become finer.
     pub moving: RefineOptions,
     /// Whether the grids were placed anew since the latest effect.
-    is_rich: bool,
+    pub is_rich: bool,
+    /// What was found before slow lags were taken out of G.
+    pub before: Option<Before>,
     pub point: Point,
     pub cost: f64,
     pub rounds: Vec<Round>,
@@ -98,6 +101,7 @@ impl<'a> Search<'a> {
             order_is_given,
             moving,
             is_rich: false,
+            before: None,
             point: refined.fitted.point.clone(),
             cost: refined.fitted.linearization.cost,
             rounds: Vec::new(),
@@ -113,7 +117,7 @@ impl<'a> Search<'a> {
         for _ in 0..ROUNDS {
             let known = self.rounds.len();
             self.round(progress)?;
-            if self.rounds.len() == known {
+            if self.rounds.len() == known && !self.shed_lags(progress)? {
                 break;
             }
         }
@@ -262,9 +266,21 @@ impl<'a> Search<'a> {
         score: Score,
         progress: Progress,
     ) -> Result<Trial, Error> {
-        let start = self.point.with_effect(score.start);
+        /// Where the start that the score test suggests is worse than the model without the effect by this
+        /// factor of the squares, it is beyond what is linear.
+        const BEYOND: f64 = 10.0;
+        let mut start = self.point.with_effect(score.start);
+        if let Some(zero) = score.zero
+            && self.squares(&start, &self.prepared.record)?.iter().sum::<f64>() > BEYOND * self.cost
+        {
+            start = self.point.with_effect(zero);
+        }
         let record = &self.prepared.record;
         let fitted = fit(start, record, &self.options, entry.name, progress)?;
+        eprintln!(
+            "TRIAL {} gain {} base {} hist {:?} {:?}",
+            entry.name, score.gain, self.cost, fitted.history, fitted.status
+        );
         self.judged(entry, fitted, score.gain, progress)
     }
 

@@ -168,25 +168,50 @@ impl Point {
         }
         let known = self.signals(experiment, index)?;
         let here = self.output_from(Stage::Added, &known, experiment, index)?;
-        let mut columns = Vec::new();
-        for (place, effect) in self.effects.iter().enumerate() {
-            let block = effect.block();
-            let sections = !block.sections(self.rate).is_empty();
-            let mut own = Vec::new();
-            for (number, step) in block.steps().into_iter().enumerate() {
-                if sections {
-                    break;
-                }
-                let mut values = block.values();
-                values[number] += step;
-                let mut moved = self.clone();
-                moved.effects[place].block_mut().set(&values);
-                let there = moved.output_from(block.stage(), &known, experiment, index)?;
-                own.push((there - &here) / step);
-            }
-            columns.push(own);
+        (0..self.effects.len())
+            .map(|place| self.columns_of(place, &known, &here, experiment, index))
+            .collect()
+    }
+
+    /// The same of one effect; `here` is the output.
+    pub(crate) fn columns_of(
+        &self,
+        place: usize,
+        known: &Signals,
+        here: &Matrix,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Vec<Matrix>, Error> {
+        let block = self.effects[place].block();
+        if !block.sections(self.rate).is_empty() {
+            return Ok(Vec::new());
         }
-        Ok(columns)
+        let steps = block.steps();
+        if block.reads() {
+            let input = block.channel();
+            let past = self.pasts[index].plays.as_ref();
+            let start = past.map(|plays| &plays[input][..]);
+            let drive: Vec<f64> = known.drive.column(input).iter().copied().collect();
+            let channel = &self.channels[input];
+            let slopes = channel.reading_slopes(start, self.beside(input), &drive, block);
+            let column = |(step, slope): (f64, nalgebra::RowDVector<f64>)| {
+                let mut moved = known.clone();
+                moved.intermediate.column_mut(input).axpy(step, &slope.transpose(), 1.0);
+                let there = self.output_from(Stage::Dynamics, &moved, experiment, index)?;
+                Ok((there - here) / step)
+            };
+            let rows = slopes.row_iter().map(|row| row.into_owned());
+            return steps.into_iter().zip(rows).map(column).collect();
+        }
+        let column = |(number, step): (usize, f64)| {
+            let mut values = block.values();
+            values[number] += step;
+            let mut moved = self.clone();
+            moved.effects[place].block_mut().set(&values);
+            let there = moved.output_from(block.stage(), known, experiment, index)?;
+            Ok((there - here) / step)
+        };
+        steps.into_iter().enumerate().map(column).collect()
     }
 
     /// Measured minus simulated outputs of each experiment, (samples, outputs), warm-ups included.
@@ -242,6 +267,7 @@ impl Point {
 }
 
 /// Signals along the chain, each (samples, channels).
+#[derive(Clone)]
 pub(crate) struct Signals {
     /// The input as it reaches the hysteresis.
     pub drive: Matrix,

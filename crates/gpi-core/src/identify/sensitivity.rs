@@ -1,8 +1,8 @@
 //! The output of one hysteresis and its derivatives, streamed sample by sample.
 
-use crate::Hysteresis;
 use crate::effects::{Block, Moment};
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading, play};
+use crate::{Hysteresis, Matrix};
 
 /// Parameters of one hysteresis: `z = sum_j g_j Z_{eta_j}(u)`, then plays.
 ///
@@ -76,12 +76,47 @@ impl Parameters {
     }
 
     /// Replaces samples of u by those of v; `start` as in [`Sensitivity::new`].
-    pub(crate) fn apply(&self, start: Option<&[f64]>, mut beside: Beside, signal: &mut [f64]) {
-        let n = self.half_widths.len();
-        let (mut plays, mut start) = (vec![0.0; n], start);
+    pub(crate) fn apply(&self, start: Option<&[f64]>, beside: Beside, signal: &mut [f64]) {
+        let mut k = 0;
+        let u = signal.to_vec();
+        self.run(start, beside, &u, &mut |plays, beside| {
+            let plays = plays.iter().zip(&self.half_widths).zip(&self.weights);
+            signal[k] = plays.map(|((&place, &r), weight)| weight * beside.read(r, place).0).sum();
+            k += 1;
+        });
+    }
+
+    /// Derivatives of v by the values of a block that reads the plays, (values, samples).
+    pub(crate) fn reading_slopes(
+        &self,
+        start: Option<&[f64]>,
+        beside: Beside,
+        u: &[f64],
+        block: &dyn Block,
+    ) -> Matrix {
+        let mut slopes = Matrix::zeros(block.values().len(), u.len());
+        let mut k = 0;
+        self.run(start, beside, u, &mut |plays, _| {
+            let mut column = slopes.column_mut(k);
+            for ((&place, &r), &weight) in plays.iter().zip(&self.half_widths).zip(&self.weights) {
+                block.read_slopes(r, place, weight, column.as_mut_slice());
+            }
+            k += 1;
+        });
+        slopes
+    }
+
+    /// Shows the places of all plays sample by sample.
+    fn run(
+        &self,
+        start: Option<&[f64]>,
+        mut beside: Beside,
+        u: &[f64],
+        show: &mut dyn FnMut(&[f64], &Beside),
+    ) {
+        let (mut plays, mut start) = (vec![0.0; self.half_widths.len()], start);
         let mut previous = None;
-        for value in signal {
-            let u = *value;
+        for &u in u {
             beside.speed_seen(previous, u);
             let z = self.envelope(previous.unwrap_or(0.0), u);
             previous = Some(u);
@@ -89,13 +124,10 @@ impl Parameters {
                 let places = sides.iter().zip(&self.half_widths).map(|(side, r)| z + side * r);
                 plays.iter_mut().zip(places).for_each(|(play, place)| *play = place);
             }
-            let mut v = 0.0;
-            for i in 0..n {
-                let r = self.half_widths[i];
-                plays[i] = play(beside.width(r).0, z, plays[i]);
-                v += self.weights[i] * beside.read(r, plays[i]).0;
+            for (place, &r) in plays.iter_mut().zip(&self.half_widths) {
+                *place = play(beside.width(r).0, z, *place);
             }
-            *value = v;
+            show(&plays, &beside);
         }
     }
 }

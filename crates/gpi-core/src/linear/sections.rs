@@ -74,7 +74,7 @@ impl Section {
         }
     }
 
-    fn poles(&self) -> Vec<Complex64> {
+    pub(crate) fn poles(&self) -> Vec<Complex64> {
         match self.a[..] {
             [a1, a2] => {
                 let root = Complex64::new(0.25 * a1 * a1 - a2, 0.0).sqrt();
