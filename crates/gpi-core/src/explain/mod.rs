@@ -26,11 +26,11 @@ use crate::identify::refine::{RefineOptions, Refined, settings};
 use crate::identify::residuals_from_fitted_start;
 use crate::identify::{Grid, IdentifyOptions, Parameter, Progress, Refinement};
 use crate::{Error, Matrix, Model, Record, SimulationError};
-pub use residual::ResidualTest;
+pub use residual::{ResidualOptions, ResidualTest, residual_tests};
 pub use search::Rejected;
 use search::{Round, Search};
 use std::ops::Range;
-pub use verdict::{NextExperiment, Verdict};
+pub use verdict::{NextExperiment, Verdict, structured};
 
 /// What an explanation may use.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -232,16 +232,7 @@ fn summarise(
     };
     let before = errors(measured, &base, &residuals_before)?;
     let after = errors(mended, &model, &residuals_after)?;
-    let simulated: Vec<Matrix> = residuals_after
-        .iter()
-        .zip(mended.experiments())
-        .map(|(residual, experiment)| &experiment.output - residual)
-        .collect();
-    let tests = residual::analyse(&residual::Beside {
-        record: mended,
-        residuals: &residuals_after,
-        simulated: &simulated,
-    })?;
+    let tests = residual::tests_of(&model, mended, &residuals_after)?;
     let noise: Vec<Effect> = noise::effects(&search, &residuals_after, &tests)?
         .into_iter()
         .filter(|effect| search.allowed.iter().any(|entry| entry.name == effect.name()))

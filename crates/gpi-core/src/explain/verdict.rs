@@ -36,14 +36,31 @@ pub struct NextExperiment {
     pub command: String,
 }
 
-/// Memory alone is noise with a colour once that was found; anything that follows input or time is not.
-pub(crate) fn verdict(effects: &[&str], tests: &[ResidualTest]) -> Verdict {
+/// Whether tests show more than the noise of a model with these effects: a dependence on input or time,
+/// or memory.
+///
+/// Memory alone is noise with a colour once `coloured-noise` is among the effects, and isolated wrong
+/// samples are no structure.
+///
+/// ```
+/// use gpi_core::explain::{ResidualTest, structured};
+/// let name = "whiteness";
+/// let test = ResidualTest {
+///     name, output: 0, statistic: 90.0, threshold: 50.0, p_value: 1e-8, points_to: "memory",
+/// };
+/// assert!(structured(&[], &[test.clone()]));
+/// assert!(!structured(&["coloured-noise"], &[test]));
+/// ```
+pub fn structured(effects: &[&str], tests: &[ResidualTest]) -> bool {
     let coloured = effects.contains(&"coloured-noise");
-    let fails = |test: &ResidualTest| {
-        !test.passed()
-            && (STRUCTURE.contains(&test.name) || (test.name == "whiteness" && !coloured))
+    let shows = |test: &ResidualTest| {
+        STRUCTURE.contains(&test.name) || (test.name == "whiteness" && !coloured)
     };
-    match (tests.iter().any(fails), effects.is_empty()) {
+    tests.iter().any(|test| !test.passed() && shows(test))
+}
+
+pub(crate) fn verdict(effects: &[&str], tests: &[ResidualTest]) -> Verdict {
+    match (structured(effects, tests), effects.is_empty()) {
         (false, _) => Verdict::Explained,
         (true, false) => Verdict::PartlyExplained,
         (true, true) => Verdict::Unattributed,

@@ -1,0 +1,56 @@
+//! Chances of the statistics where there is nothing to be found, and the values that have a given chance.
+
+use statrs::function::{erf, gamma};
+
+/// The chance of a standard normal number beyond plus or minus z.
+pub(super) fn normal_tails(z: f64) -> f64 {
+    erf::erfc(z / std::f64::consts::SQRT_2)
+}
+
+/// The size that a standard normal number exceeds with this chance.
+pub(super) fn normal_beyond(chance: f64) -> f64 {
+    std::f64::consts::SQRT_2 * erf::erfc_inv(chance)
+}
+
+/// The chance of a chi-square number above `value`.
+pub(super) fn chi_square_tail(value: f64, freedom: f64) -> f64 {
+    gamma::gamma_ur(0.5 * freedom, 0.5 * value.max(1e-300))
+}
+
+/// The chance of at least `count` events where so many are expected (Poisson).
+pub(super) fn at_least(count: usize, expected: f64) -> f64 {
+    if count == 0 { 1.0 } else { gamma::gamma_lr(count as f64, expected.max(1e-300)) }
+}
+
+/// Where a falling tail comes down to a chance.
+pub(super) fn exceeded_with(chance: f64, tail: impl Fn(f64) -> f64) -> f64 {
+    const DOUBLINGS: usize = 60;
+    const HALVINGS: usize = 100;
+    let mut high = 1.0;
+    for _ in 0..DOUBLINGS {
+        if tail(high) <= chance {
+            break;
+        }
+        high *= 2.0;
+    }
+    let mut low = 0.0;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if tail(middle) > chance { low = middle } else { high = middle }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_and_chances_are_those_of_the_tables() {
+        assert!((normal_beyond(0.05) - 1.959_964).abs() < 1e-5);
+        assert!((normal_tails(normal_beyond(1e-6)) / 1e-6 - 1.0).abs() < 1e-6);
+        let value = exceeded_with(0.01, |value| chi_square_tail(value, 25.0));
+        assert!((value - 44.314).abs() < 1e-3);
+        assert!((at_least(2, 0.5) - (1.0 - 1.5 * (-0.5_f64).exp())).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,176 @@
+//! Functions of input, intermediate signal, output and time that a residual must not follow.
+
+use super::Beside;
+use crate::Matrix;
+
+/// A function of experiment and sample.
+pub(super) type Regressor<'a> = Box<dyn Fn(usize, usize) -> f64 + 'a>;
+
+/// Regressors that point to the same effects.
+pub(super) struct Family<'a> {
+    pub name: &'static str,
+    pub points_to: &'static str,
+    pub regressors: Vec<Regressor<'a>>,
+}
+
+/// One number a sample, `[experiment][sample]`.
+pub(super) type Signal = Vec<Vec<f64>>;
+
+/// A signal and its step from sample to sample, both of order one.
+pub(super) struct Moving {
+    /// Between minus one and one.
+    pub level: Signal,
+    /// Over its root mean square.
+    pub speed: Signal,
+    /// How large the fast swings of the level are.
+    pub swing: Signal,
+}
+
+/// What a residual of one output is compared with.
+pub(super) struct Signals {
+    pub inputs: Vec<Moving>,
+    /// The model's v, whose past is what G sees.
+    pub intermediates: Vec<Moving>,
+    output: Moving,
+    samples: Vec<usize>,
+}
+
+impl Signals {
+    pub(super) fn new(beside: &Beside, output: usize) -> Self {
+        /// Seconds over which a swing is taken.
+        const SWING: f64 = 0.05;
+        let window = SWING * beside.record.rate();
+        let given: Vec<&Matrix> = beside.record.experiments().iter().map(|e| &e.input).collect();
+        let v: Vec<&Matrix> = beside.intermediate.iter().collect();
+        let simulated: Vec<&Matrix> = beside.simulated.iter().collect();
+        let channels = 0..beside.record.inputs().len();
+        Self {
+            inputs: channels.clone().map(|input| Moving::of(&given, input, window)).collect(),
+            intermediates: channels.map(|input| Moving::of(&v, input, window)).collect(),
+            output: Moving::of(&simulated, output, window),
+            samples: given.iter().map(|m| m.nrows()).collect(),
+        }
+    }
+
+    /// All families, those of the inputs with the regressors of every input.
+    pub(super) fn families(&self) -> Vec<Family<'_>> {
+        let x = &self.output.level;
+        let mut families = vec![
+            Family::new("past-input", "linear-dynamics, delay, creep"),
+            Family::new("past-intermediate", "linear-dynamics, creep"),
+            Family::new("level", "output-nonlinearity, envelope"),
+            Family::new("speed", "rate-dependence, amplifier-slew"),
+            Family::new("direction", "backlash, hysteresis-shape"),
+            Family::new("amplitude", "stiffness"),
+            Family::new("trend", "drift, gain-drift, creep"),
+        ];
+        let [past_input, past_intermediate, level, speed, direction, amplitude, trend] =
+            &mut families[..]
+        else {
+            return families;
+        };
+        level.powers(x, 1..=5);
+        amplitude.regressors.push(Box::new(|e, k| self.output.swing[e][k] * x[e][k]));
+        for input in &self.inputs {
+            past_input.past(input);
+            let s = |e: usize, k: usize| input.speed[e][k].clamp(-5.0, 5.0);
+            speed.regressors.push(Box::new(move |e, k| s(e, k).abs()));
+            speed.regressors.push(Box::new(move |e, k| s(e, k) * s(e, k).abs()));
+            speed.regressors.push(Box::new(move |e, k| s(e, k) * s(e, k)));
+            speed.regressors.push(Box::new(move |e, k| x[e][k] * s(e, k).abs()));
+            for power in 0..4 {
+                let sign = move |e: usize, k: usize| sign(input.speed[e][k]);
+                direction.regressors.push(Box::new(move |e, k| sign(e, k) * x[e][k].powi(power)));
+            }
+            let swing = &self.output.swing;
+            amplitude.regressors.push(Box::new(move |e, k| swing[e][k] * input.speed[e][k]));
+        }
+        self.intermediates.iter().for_each(|v| past_intermediate.past(v));
+        let time = |e: usize, k: usize| 2.0 * k as f64 / self.samples[e] as f64 - 1.0;
+        trend.regressors.push(Box::new(time));
+        trend.regressors.push(Box::new(move |e, k| time(e, k).powi(2)));
+        trend.regressors.push(Box::new(move |e, k| time(e, k).powi(3)));
+        trend.regressors.push(Box::new(move |e, k| (6.0 * time(e, k)).sin()));
+        trend.regressors.push(Box::new(move |e, k| (6.0 * time(e, k)).cos()));
+        families
+    }
+}
+
+impl<'a> Family<'a> {
+    fn new(name: &'static str, points_to: &'static str) -> Self {
+        Self { name, points_to, regressors: Vec::new() }
+    }
+
+    /// The level, and steps of the past.
+    fn past(&mut self, signal: &'a Moving) {
+        self.regressors.push(Box::new(|e, k| signal.level[e][k]));
+        for lag in [0, 1, 2, 4, 8, 16, 32, 64, 128, 256] {
+            self.regressors.push(Box::new(move |e, k| signal.step(e, k, lag)));
+        }
+    }
+
+    fn powers(&mut self, signal: &'a Signal, powers: impl Iterator<Item = i32>) {
+        for power in powers {
+            self.regressors.push(Box::new(move |e, k| signal[e][k].powi(power)));
+        }
+    }
+}
+
+impl Moving {
+    fn of(signals: &[&Matrix], column: usize, window: f64) -> Self {
+        let values =
+            || signals.iter().flat_map(|m| m.column(column).iter().copied().collect::<Vec<_>>());
+        let low = values().fold(f64::INFINITY, f64::min);
+        let high = values().fold(f64::NEG_INFINITY, f64::max);
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low).max(f64::MIN_POSITIVE));
+        let scaled = |m: &&Matrix| m.column(column).iter().map(|x| (x - middle) / half).collect();
+        let level: Signal = signals.iter().map(scaled).collect();
+        let mut speed: Signal = level.iter().map(|x| steps(x)).collect();
+        let squares: f64 = speed.iter().flatten().map(|s| s * s).sum();
+        let count = speed.iter().map(Vec::len).sum::<usize>() as f64;
+        let scale = (squares / count).sqrt().max(f64::MIN_POSITIVE);
+        speed.iter_mut().flatten().for_each(|s| *s /= scale);
+        let swing = level.iter().map(|x| swelling(x, window)).collect();
+        Self { level, speed, swing }
+    }
+
+    /// The level, then the steps so many samples ago.
+    pub(super) fn past<'a>(
+        &'a self,
+        experiment: usize,
+        k: usize,
+        lags: &'a [usize],
+    ) -> impl Iterator<Item = f64> + 'a {
+        let steps = lags.iter().map(move |&lag| self.step(experiment, k, lag));
+        std::iter::once(self.level[experiment][k]).chain(steps)
+    }
+
+    /// The step so many samples ago; zero before the first sample.
+    fn step(&self, experiment: usize, k: usize, lag: usize) -> f64 {
+        k.checked_sub(lag).map_or(0.0, |past| self.speed[experiment][past])
+    }
+}
+
+fn steps(x: &[f64]) -> Vec<f64> {
+    let first = x.first().map(|_| 0.0);
+    first.into_iter().chain(x.windows(2).map(|pair| pair[1] - pair[0])).collect()
+}
+
+fn sign(s: f64) -> f64 {
+    if s == 0.0 { 0.0 } else { s.signum() }
+}
+
+/// How large the swings of a signal are at each sample: the square of what is fast in it, smoothed over
+/// so many samples.
+fn swelling(signal: &[f64], samples: f64) -> Vec<f64> {
+    let keep = (-1.0 / samples.max(1.0)).exp();
+    let (mut slow, mut square) = (signal.first().copied().unwrap_or(0.0), 0.0);
+    signal
+        .iter()
+        .map(|&value| {
+            slow = keep * slow + (1.0 - keep) * value;
+            square = keep * square + (1.0 - keep) * (value - slow).powi(2);
+            square
+        })
+        .collect()
+}

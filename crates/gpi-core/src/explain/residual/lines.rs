@@ -1,0 +1,64 @@
+//! Lines in the residual's spectrum.
+
+use super::chance::exceeded_with;
+use super::{Beside, ResidualTest};
+use num_complex::Complex64;
+use rustfft::FftPlanner;
+
+/// Neighbouring places of a spectrum that a line is compared with.
+const AROUND: usize = 64;
+
+/// The largest line of the periodogram over the median of those around it (Fisher's test, against the
+/// local background): the same for noise of any smooth spectrum.
+pub(super) fn lines(beside: &Beside, output: usize, chance: f64) -> ResidualTest {
+    let (mut most, mut count) = (0.0_f64, 0.0_f64);
+    for (residual, experiment) in beside.residuals.iter().zip(beside.record.experiments()) {
+        for run in experiment.scored_rows(residual) {
+            let values = run.column(output);
+            for chunk in periodogram(values.as_slice()).chunks_exact(AROUND) {
+                let mut sorted = chunk.to_vec();
+                sorted.sort_by(f64::total_cmp);
+                let median = sorted[AROUND / 2].max(f64::MIN_POSITIVE);
+                most = most.max(sorted[AROUND - 1] / median);
+                count += AROUND as f64;
+            }
+        }
+    }
+    let tail = |ratio: f64| count.max(1.0) * single_above(ratio);
+    ResidualTest {
+        name: "lines",
+        output,
+        statistic: most,
+        threshold: exceeded_with(chance, tail),
+        p_value: tail(most).min(1.0),
+        points_to: "periodic-disturbance",
+    }
+}
+
+/// Power over frequency without its slowest places; nothing where it would be shorter than [`AROUND`].
+fn periodogram(values: &[f64]) -> Vec<f64> {
+    const SLOWEST: usize = 4;
+    let n = values.len();
+    if n < 4 * AROUND {
+        return Vec::new();
+    }
+    let mean = values.iter().sum::<f64>() / n as f64;
+    let window = |k: usize| (std::f64::consts::PI * (k as f64 + 0.5) / n as f64).sin().powi(2);
+    let mut spectrum: Vec<Complex64> = values
+        .iter()
+        .enumerate()
+        .map(|(k, value)| Complex64::new((value - mean) * window(k), 0.0))
+        .collect();
+    FftPlanner::new().plan_fft_forward(n).process(&mut spectrum);
+    spectrum[SLOWEST..n / 2].iter().map(Complex64::norm_sqr).collect()
+}
+
+/// The chance that one exponential number exceeds the median of the others by this ratio.
+///
+/// `E exp(-ratio m)` of the m that is the j-th smallest of n exponential numbers is
+/// `prod_i (n - i) / (n - i + ratio)` for i from 0 to j - 1; j is one below the place of the median, which
+/// makes up for neighbours that the window ties together.
+fn single_above(ratio: f64) -> f64 {
+    let others = (AROUND / 2..AROUND).map(|left| left as f64);
+    others.map(|left| left / (left + ratio)).product()
+}

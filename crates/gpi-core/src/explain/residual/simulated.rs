@@ -1,0 +1,166 @@
+//! The tests on records of a known model with a known residual.
+
+use super::*;
+use crate::linear::TransferFunction;
+use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
+use crate::{Channel, Experiment};
+
+const SAMPLES: usize = 4000;
+
+/// Standard normal numbers: Lehmer's generator, sums of twelve.
+fn noise(seed: u64) -> Vec<f64> {
+    let mut x = 48_271 * (seed + 1) % 2_147_483_647;
+    let mut uniform = || {
+        x = x * 48_271 % 2_147_483_647;
+        x as f64 / 2_147_483_647.0
+    };
+    (0..SAMPLES).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+}
+
+fn model() -> Model {
+    let envelope = Deadzones::new(vec![0.0], vec![1.0], Reading::OneSided).unwrap();
+    let plays = PlayBank::new(vec![0.0, 0.5, 1.0], vec![1.0, 0.4, 0.3]).unwrap();
+    let linear =
+        TransferFunction::new(&[0.2], &[1.0, -1.5, 0.7]).unwrap().to_state_space().unwrap();
+    let channel = |name: &str| vec![Channel::new(name, "")];
+    let hysteresis = vec![Gpi::new(envelope, plays)];
+    Model::new(1000.0, channel("u"), channel("y"), hysteresis, linear, vec![0.0]).unwrap()
+}
+
+/// A drive whose swing grows and falls.
+fn drive() -> Vec<f64> {
+    let mut slow = 0.0;
+    let fast = noise(999);
+    (0..SAMPLES)
+        .map(|k| {
+            let t = k as f64 / SAMPLES as f64;
+            slow = 0.8 * slow + fast[k];
+            (0.4 + (12.0 * t).sin().powi(2)) * slow + 2.0 * (40.0 * t).sin()
+        })
+        .collect()
+}
+
+/// The tests of the true model where its output has this residual on top.
+fn tested(residual: &[f64]) -> Vec<ResidualTest> {
+    let model = model();
+    let column = |values: &[f64]| Matrix::from_column_slice(values.len(), 1, values);
+    let input = column(&drive());
+    let output = model.simulate(&input).unwrap() + column(residual);
+    let covariates = Matrix::zeros(input.nrows(), 0);
+    let run = Experiment { input, output, covariates, warmup: 0, held_out: vec![] };
+    let (u, y) = (model.inputs().to_vec(), model.outputs().to_vec());
+    let record = Record::new(vec![run], 1000.0, u, y, vec![]).unwrap();
+    residual_tests(&model, &record, &ResidualOptions::default(), &mut |_, _| true).unwrap()
+}
+
+fn failed(residual: &[f64]) -> Vec<&'static str> {
+    let tests = tested(residual);
+    tests.iter().filter(|test| !test.passed()).map(|test| test.name).collect()
+}
+
+/// Noise of standard deviation 0.1 with a signal of this size on top.
+fn with(size: f64, signal: impl Fn(usize) -> f64) -> Vec<f64> {
+    let values: Vec<f64> = (0..SAMPLES).map(signal).collect();
+    let rms = (values.iter().map(|x| x * x).sum::<f64>() / SAMPLES as f64).sqrt();
+    noise(7).iter().zip(values).map(|(e, x)| 0.1 * (e + size * x / rms)).collect()
+}
+
+/// `e(k) = 0.95 e(k-1) + w(k)`.
+fn coloured(seed: u64) -> Vec<f64> {
+    let mut state = 0.0;
+    let filter = |w: f64| {
+        state = 0.95 * state + 0.1 * w;
+        state
+    };
+    noise(seed).into_iter().map(filter).collect()
+}
+
+#[test]
+fn every_test_has_its_name_and_threshold() {
+    let tests = tested(&noise(1));
+    assert_eq!(tests.iter().map(|test| test.name).collect::<Vec<_>>(), NAMES);
+    let chance = 0.01 / NAMES.len() as f64;
+    for test in &tests {
+        assert!(test.passed() || test.p_value < chance, "{test:?}");
+        assert!((0.0..=1.0).contains(&test.p_value), "{test:?}");
+    }
+    assert!(STRUCTURE.iter().all(|name| NAMES.contains(name)));
+}
+
+#[test]
+fn white_noise_passes() {
+    let records = 50;
+    let failures: Vec<_> =
+        (0..records).map(|seed| failed(&noise(seed))).filter(|names| !names.is_empty()).collect();
+    // half a record is expected
+    assert!(failures.len() <= 2, "{failures:?}");
+    assert!(!failures.iter().flatten().any(|name| *name == "level-to-level"));
+}
+
+#[test]
+fn noise_with_memory_is_no_dependence() {
+    let mut structured = 0;
+    for seed in 0..50 {
+        let names = failed(&coloured(seed));
+        assert!(names.contains(&"whiteness"));
+        structured += usize::from(names.iter().any(|name| STRUCTURE.contains(name)));
+        assert!(!names.contains(&"level-to-level"));
+    }
+    assert!(structured <= 2, "{structured}");
+}
+
+#[test]
+fn dynamics_that_change_with_the_swing_fail_from_level_to_level() {
+    let u = drive();
+    let swing = |k: usize| (12.0 * k as f64 / SAMPLES as f64).sin().powi(2);
+    for lag in [0, 2, 5, 11] {
+        let residual = with(1.0, |k| if k < lag { 0.0 } else { swing(k) * u[k - lag] });
+        assert!(failed(&residual).contains(&"level-to-level"), "lag {lag}");
+    }
+}
+
+#[test]
+fn dynamics_that_are_missing_at_every_swing_are_told_apart() {
+    let u = drive();
+    let residual = with(3.0, |k| if k < 4 { 0.0 } else { u[k] - 0.7 * u[k - 1] + 0.5 * u[k - 4] });
+    let names = failed(&residual);
+    assert!(names.contains(&"past-input"));
+    assert!(!names.contains(&"level-to-level"), "{names:?}");
+}
+
+#[test]
+fn the_past_of_v_is_looked_at() {
+    let v = model().intermediate(&Matrix::from_column_slice(SAMPLES, 1, &drive())).unwrap();
+    let residual = with(0.5, |k| if k < 9 { 0.0 } else { v[k - 8] - v[k - 9] });
+    assert!(failed(&residual).contains(&"past-intermediate"));
+}
+
+#[test]
+fn an_offset_fails_alone() {
+    let residual: Vec<f64> = noise(3).iter().map(|e| 0.1 * e + 0.05).collect();
+    assert_eq!(failed(&residual), ["mean"]);
+}
+
+#[test]
+fn nothing_left_is_nothing_found() {
+    assert!(failed(&[0.0; SAMPLES]).is_empty());
+}
+
+#[test]
+fn another_rate_is_refused() {
+    let model = model();
+    let signal = Matrix::from_column_slice(SAMPLES, 1, &drive());
+    let covariates = Matrix::zeros(SAMPLES, 0);
+    let run = Experiment {
+        input: signal.clone(),
+        output: signal,
+        covariates,
+        warmup: 0,
+        held_out: vec![],
+    };
+    let (u, y) = (model.inputs().to_vec(), model.outputs().to_vec());
+    let record = Record::new(vec![run], 500.0, u, y, vec![]).unwrap();
+    let options = ResidualOptions::default();
+    let error = residual_tests(&model, &record, &options, &mut |_, _| true).unwrap_err();
+    assert!(error.to_string().contains("500") && error.to_string().contains("1000"), "{error}");
+}
