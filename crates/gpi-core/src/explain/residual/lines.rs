@@ -2,11 +2,55 @@
 
 use super::chance::exceeded_with;
 use super::{Beside, ResidualTest};
+use crate::Matrix;
+use crate::identify::colour::Colour;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 /// Neighbouring places of a spectrum that a line is compared with.
 const AROUND: usize = 64;
+
+/// Residuals whose spectrum is flat but for its lines: a line stands out of a steep spectrum only then.
+///
+/// The colour is taken from what the residuals are without their lines, which it would follow otherwise.
+pub(super) fn flattened(beside: &Beside) -> Vec<Matrix> {
+    let mut smooth = beside.residuals.to_vec();
+    for (residual, experiment) in smooth.iter_mut().zip(beside.record.experiments()) {
+        for run in experiment.scored_runs().filter(|run| run.len() >= 4 * AROUND) {
+            for mut column in residual.column_iter_mut() {
+                let values = &mut column.as_mut_slice()[run.clone()];
+                let without = without_lines(values);
+                values.copy_from_slice(&without);
+            }
+        }
+    }
+    Colour::of(&smooth, beside.record).whiten(beside.residuals)
+}
+
+/// A signal, tapered, with the narrow peaks of its spectrum cut down to what is beside them.
+fn without_lines(values: &[f64]) -> Vec<f64> {
+    /// A line is a few places wide; a resonance is wider, and part of the colour.
+    const BESIDE: std::ops::RangeInclusive<usize> = 4..=12;
+    /// Times the median beside it.
+    const STANDS_OUT: f64 = 12.0;
+    let n = values.len();
+    let mut spectrum = tapered_spectrum(values);
+    let power: Vec<f64> = spectrum[..n / 2].iter().map(Complex64::norm_sqr).collect();
+    let (near, far) = (*BESIDE.start(), *BESIDE.end());
+    for k in near + far..power.len().saturating_sub(far) {
+        let mut around: Vec<f64> =
+            BESIDE.flat_map(|lag| [power[k - lag], power[k + lag]]).collect();
+        around.sort_by(f64::total_cmp);
+        let background = around[around.len() / 2];
+        if power[k] > STANDS_OUT * background {
+            let scale = (background / power[k]).sqrt();
+            spectrum[k] *= scale;
+            spectrum[n - k] *= scale;
+        }
+    }
+    FftPlanner::new().plan_fft_inverse(n).process(&mut spectrum);
+    spectrum.iter().map(|value| value.re / n as f64).collect()
+}
 
 /// The largest line of the periodogram over the median of those around it (Fisher's test, against the
 /// local background): the same for noise of any smooth spectrum.
@@ -42,15 +86,19 @@ fn periodogram(values: &[f64]) -> Vec<f64> {
     if n < 4 * AROUND {
         return Vec::new();
     }
+    let spectrum = tapered_spectrum(values);
+    spectrum[SLOWEST..n / 2].iter().map(Complex64::norm_sqr).collect()
+}
+
+/// The transform of a signal without its mean under Hann's window.
+fn tapered_spectrum(values: &[f64]) -> Vec<Complex64> {
+    let n = values.len();
     let mean = values.iter().sum::<f64>() / n as f64;
     let window = |k: usize| (std::f64::consts::PI * (k as f64 + 0.5) / n as f64).sin().powi(2);
-    let mut spectrum: Vec<Complex64> = values
-        .iter()
-        .enumerate()
-        .map(|(k, value)| Complex64::new((value - mean) * window(k), 0.0))
-        .collect();
+    let tapered = |(k, value): (usize, &f64)| Complex64::new((value - mean) * window(k), 0.0);
+    let mut spectrum: Vec<Complex64> = values.iter().enumerate().map(tapered).collect();
     FftPlanner::new().plan_fft_forward(n).process(&mut spectrum);
-    spectrum[SLOWEST..n / 2].iter().map(Complex64::norm_sqr).collect()
+    spectrum
 }
 
 /// The chance that one exponential number exceeds the median of the others by this ratio.

@@ -14,7 +14,6 @@ mod simulated;
 mod whiteness;
 mod wrong_samples;
 
-use crate::identify::colour::Colour;
 use crate::identify::refine::require_match;
 use crate::identify::{Progress, residuals_from_fitted_start};
 use crate::{Error, Matrix, Model, Record};
@@ -201,8 +200,7 @@ fn analyse(given: &Beside) -> Vec<ResidualTest> {
     let given = &Beside { residuals: &known, ..*given };
     let centred = given.centred(&known);
     let beside = &Beside { residuals: &centred, ..*given };
-    // A line stands out of a steep spectrum only once that is flat.
-    let flat = Colour::of(&centred, beside.record).whiten(&centred);
+    let flat = lines::flattened(beside);
     let whitened = Beside { residuals: &flat, ..*beside };
     let squares: Vec<Matrix> = centred.iter().map(|m| m.map(|value| value * value)).collect();
     let squares = beside.centred(&squares);

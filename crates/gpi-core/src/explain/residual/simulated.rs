@@ -129,6 +129,27 @@ fn dynamics_that_are_missing_at_every_swing_are_told_apart() {
 }
 
 #[test]
+fn a_line_of_any_size_is_found() {
+    for size in [0.3, 1.0, 3.0, 10.0, 100.0] {
+        let residual = with(size, |k| (0.314 * k as f64).sin());
+        assert!(failed(&residual).contains(&"lines"), "{size}");
+    }
+}
+
+#[test]
+fn a_resonance_is_no_line() {
+    for seed in 0..20 {
+        let (mut last, mut before) = (0.0, 0.0);
+        let ring = |w: f64| {
+            (last, before) = (1.95 * last - 0.96 * before + w, last);
+            last
+        };
+        let residual: Vec<f64> = noise(seed).into_iter().map(ring).collect();
+        assert!(!failed(&residual).contains(&"lines"), "{seed}");
+    }
+}
+
+#[test]
 fn the_past_of_v_is_looked_at() {
     let v = model().intermediate(&Matrix::from_column_slice(SAMPLES, 1, &drive())).unwrap();
     let residual = with(0.5, |k| if k < 9 { 0.0 } else { v[k - 8] - v[k - 9] });
