@@ -46,6 +46,7 @@ from gpi_hammerstein._native import (
     multisine,
     prbs,
     refine,
+    residual_tests,
     sensitivities,
 )
 from gpi_hammerstein.files import load_model as load
@@ -87,6 +88,7 @@ __all__ = [
     "prbs",
     "read_record",
     "refine",
+    "residual_tests",
     "save",
     "sensitivities",
 ]

@@ -38,6 +38,7 @@ __all__ = [
     "sensitivities",
     "explain",
     "effect_names",
+    "residual_tests",
     "time_axis",
     "multisine",
     "prbs",
@@ -401,6 +402,9 @@ def explain(
     progress: Callable[[str, float], object] | None = None,
 ) -> Explanation: ...
 def effect_names() -> dict[str, str]: ...
+def residual_tests(
+    model: Model, record: Record, *, fit_start: bool = False, remove_mean: bool = False
+) -> dict[str, Any]: ...
 def time_axis(stamps: ArrayLike) -> tuple[float, float]: ...
 def multisine(
     samples: int,

@@ -1,13 +1,13 @@
 """An explanation as the JSON object `gpi-explanation/1`, and in words."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from gpi_hammerstein._native import Explanation, effect_names
 
-__all__ = ["in_words", "to_dict"]
+__all__ = ["failed_in_words", "in_words", "to_dict"]
 
 
 def to_dict(found: Explanation) -> dict[str, Any]:
@@ -123,12 +123,7 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
         )
     else:
         yield f"What is left is {left:.4g}{space} rms; the noise floor is {floor:.4g}{space}."
-    failed = [test for test in result["residual"]["tests"] if not test["passed"]]
-    for test in failed:
-        yield (
-            f"It fails the test {test['name']} ({test['statistic']:.3g} over {test['threshold']:.3g}), which "
-            f"points to {test['points_to']}."
-        )
+    yield from failed_in_words(result["residual"]["tests"])
     yield {
         "explained": "Verdict: explained; the residual shows no more than noise.",
         "partly-explained": "Verdict: partly explained; structure is left in the residual.",
@@ -141,6 +136,18 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
 def is_above(floor: float, left: float) -> bool:
     """Return whether a noise floor is above what is left: it was seen with an effect in it, such as hum."""
     return floor > 1.2 * left
+
+
+def failed_in_words(tests: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield a sentence for every test that fails, with its picture where there is one."""
+    for test in tests:
+        if not test["passed"]:
+            picture = f" (see {test['picture']})" if test.get("picture") else ""
+            yield (
+                f"The residual of {test['output']} fails the test {test['name']} "
+                f"({test['statistic']:.3g} over {test['threshold']:.3g}), which points to "
+                f"{test['points_to']}{picture}."
+            )
 
 
 def number(label: str, row: Mapping[str, Any]) -> str:

@@ -52,6 +52,7 @@ def test_given_axes_are_drawn_on_and_returned(record: gpi.Record, model: gpi.Mod
     u = record.u[0][:, 0]
     impulse_response = gpi.fir(u, record.y[0], 31)
     system = gpi.era(impulse_response.markov)
+    left = gpi.plot.Residuals.of_model(model, record)
     for draw in (
         lambda ax: gpi.plot.loop(u, model.intermediate(u), model, ax=ax),
         lambda ax: gpi.plot.markov(impulse_response, ax=ax),
@@ -64,6 +65,9 @@ def test_given_axes_are_drawn_on_and_returned(record: gpi.Record, model: gpi.Mod
         lambda ax: gpi.plot.singular_values(system, ax=ax),
         lambda ax: gpi.plot.fit(model, record, ax=ax),
         lambda ax: gpi.plot.residual(model, record, ax=ax),
+        lambda ax: gpi.plot.residual_in_time(left, ax),
+        lambda ax: gpi.plot.residual_spectrum(left, ax),
+        lambda ax: gpi.plot.residual_over_input(left, ax),
     ):
         ax = figure.add_subplot()
         assert draw(ax) is ax
@@ -93,6 +97,17 @@ def test_what_is_drawn_is_the_data(record: gpi.Record, model: gpi.Model) -> None
     bode = gpi.plot.bode(model.linear, RATE).lines[0]
     assert bode.get_xdata()[-1] == pytest.approx(RATE / 2)
     assert bode.get_ydata()[0] == pytest.approx(20 * np.log10(abs(model.linear.dc_gain.item())), abs=0.1)
+
+
+def test_the_autocorrelation_is_that_of_the_scored_residual(record: gpi.Record, model: gpi.Model) -> None:
+    left = gpi.plot.Residuals.of_model(model, record, remove_mean=True)
+    ax = gpi.plot.residual_autocorrelation(left, lags=5)
+    scored = (record.y[0] - model.simulate(record.u[0]).reshape(-1, 1))[record.warmup[0] :, 0]
+    scored = scored - scored.mean()
+    expected = [scored[k:] @ scored[:-k] / (scored @ scored) for k in range(1, 6)]
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), expected, atol=1e-9)
+    [bounds] = ax.patches
+    assert bounds.get_height() == pytest.approx(2 * 1.96 / np.sqrt(len(scored)))
 
 
 def test_units_of_the_record_are_on_the_axes(record: gpi.Record, model: gpi.Model) -> None:

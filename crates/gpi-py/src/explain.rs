@@ -6,6 +6,7 @@ use crate::model::Model;
 use crate::operators::read_reading;
 use crate::record::Record;
 use crate::refine::Refinement;
+use crate::residual::test_rows;
 use gpi_core::SimulationError;
 use gpi_core::effects::CATALOGUE;
 use gpi_core::explain as core;
@@ -189,25 +190,6 @@ impl Explanation {
         let effects = self.found.effects.join(", ");
         format!("Explanation([{effects}], {}, {before:.4e} -> {after:.4e})", self.verdict())
     }
-}
-
-fn test_rows<'py>(
-    py: Python<'py>,
-    tests: &[core::ResidualTest],
-    model: &gpi_core::Model,
-) -> PyResult<Vec<Bound<'py, PyDict>>> {
-    let row = |test: &core::ResidualTest| {
-        let row = PyDict::new(py);
-        row.set_item("name", test.name)?;
-        row.set_item("output", &model.outputs()[test.output].name)?;
-        row.set_item("statistic", test.statistic)?;
-        row.set_item("threshold", test.threshold)?;
-        row.set_item("p_value", test.p_value)?;
-        row.set_item("passed", test.passed())?;
-        row.set_item("points_to", test.points_to)?;
-        Ok(row)
-    };
-    tests.iter().map(row).collect()
 }
 
 /// Finds out what a record's model lacks, adds it, and reports the error before and after.

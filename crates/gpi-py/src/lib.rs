@@ -14,6 +14,7 @@ mod operators;
 mod plotting;
 mod record;
 mod refine;
+mod residual;
 mod state_space;
 
 use pyo3::prelude::*;
@@ -32,5 +33,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     identify::register(module)?;
     refine::register(module)?;
     explain::register(module)?;
+    residual::register(module)?;
     excitation::register(module)
 }

@@ -25,6 +25,7 @@ from gpi_hammerstein.cli.output import (
     working,
     write_json,
 )
+from gpi_hammerstein.cli.residual import name_pictures, write_residual_pictures
 from gpi_hammerstein.explanation import in_words, to_dict
 
 MODEL = "Model"
@@ -114,6 +115,7 @@ def explain(
     where = "blocks of time spread over the record" if other is None else f"another record: {holdout_record}"
     result |= {"holdout": where, "files": []}
     if out is not None:
+        name_pictures(result["residual"]["tests"], record.output_names)
         write_results(out, found, result, "explanation.json")
     if as_json:
         print_json(result)
@@ -170,10 +172,8 @@ def write_results(out: Path, found: Explanation, result: dict[str, Any], name: s
 
 
 def write_pictures(folder: Path, found: Explanation) -> None:
-    """Draw the residual before and after, in time, over frequency and against u, and the loop."""
-    from gpi_hammerstein.plot import explanation as draw
+    """Draw the residual before and after, and the loop."""
+    from gpi_hammerstein import plot
 
-    picture(folder / "residual_time.png", lambda ax: draw.residual_in_time(found, ax), 10.0)
-    picture(folder / "residual_spectrum.png", lambda ax: draw.residual_spectrum(found, ax))
-    picture(folder / "residual_over_input.png", lambda ax: draw.residual_over_input(found, ax))
-    picture(folder / "loop.png", lambda ax: draw.loops(found, ax), 6.0, 6.0)
+    write_residual_pictures(folder, plot.Residuals.of_explanation(found))
+    picture(folder / "loop.png", lambda ax: plot.loops(found, ax), 6.0, 6.0)

@@ -5,17 +5,20 @@ Every function draws on the axes it is given and returns them. Without axes it m
 to each side, 95 % where the errors are normal.
 """
 
-from gpi_hammerstein.plot.explanation import (
-    loops,
+from gpi_hammerstein.plot.explanation import loops
+from gpi_hammerstein.plot.linear import bode, markov, singular_values
+from gpi_hammerstein.plot.residuals import (
+    Residuals,
+    residual_autocorrelation,
     residual_in_time,
     residual_over_input,
     residual_spectrum,
 )
-from gpi_hammerstein.plot.linear import bode, markov, singular_values
 from gpi_hammerstein.plot.search import candidates, history
 from gpi_hammerstein.plot.signals import fit, loop, residual
 
 __all__ = [
+    "Residuals",
     "bode",
     "candidates",
     "fit",
@@ -24,6 +27,7 @@ __all__ = [
     "loops",
     "markov",
     "residual",
+    "residual_autocorrelation",
     "residual_in_time",
     "residual_over_input",
     "residual_spectrum",

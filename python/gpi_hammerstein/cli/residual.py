@@ -1,0 +1,81 @@
+"""Tests and pictures of a residual, as commands show them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from gpi_hammerstein.cli.output import picture
+
+if TYPE_CHECKING:
+    from gpi_hammerstein.plot import Residuals
+
+# Where the structure that a test finds is seen best.
+PICTURES = {
+    "mean": "residual_time",
+    "whiteness": "residual_autocorrelation",
+    "lines": "residual_spectrum",
+    "past-input": "residual_spectrum",
+    "past-intermediate": "residual_spectrum",
+    "level": "residual_over_input",
+    "speed": "residual_over_input",
+    "direction": "residual_over_input",
+    "amplitude": "residual_time",
+    "level-to-level": "residual_time",
+    "trend": "residual_time",
+    "higher-order": "residual_time",
+    "outliers": "residual_time",
+}
+
+
+def file_name(kind: str, output: int, outputs: int) -> str:
+    """Return the name of a picture, numbered from 1 where there are several outputs."""
+    return f"{kind}.png" if outputs == 1 else f"{kind}_{output + 1}.png"
+
+
+def name_pictures(tests: list[dict[str, Any]], outputs: Sequence[str], *, drawn: bool = True) -> None:
+    """Add to every test the ``picture`` that shows why it fails; None where it passes or none is drawn."""
+    for test in tests:
+        kind = PICTURES.get(test["name"], "residual_time")
+        name = file_name(kind, outputs.index(test["output"]), len(outputs))
+        test["picture"] = name if drawn and not test["passed"] else None
+
+
+def write_residual_pictures(folder: Path, left: "Residuals") -> None:
+    """Draw every output's residual in time, over frequency, over the input and over the lag."""
+    from gpi_hammerstein import plot
+
+    outputs = len(left.record.output_names)
+    for output in range(outputs):
+        draws = {
+            "residual_time": plot.residual_in_time,
+            "residual_spectrum": plot.residual_spectrum,
+            "residual_over_input": plot.residual_over_input,
+            "residual_autocorrelation": plot.residual_autocorrelation,
+        }
+        for kind, draw in draws.items():
+            width = 10.0 if kind == "residual_time" else 8.0
+            path = folder / file_name(kind, output, outputs)
+            picture(path, lambda ax, draw=draw, output=output: draw(left, ax, output=output), width)  # type: ignore[misc]
+
+
+def tests_table(tests: Sequence[dict[str, Any]]) -> Table:
+    """Return the tests for people to read."""
+    table = Table(title="Tests of the residual", title_justify="left")
+    several = len({test["output"] for test in tests}) > 1
+    names = ["output"] * several + ["test", "statistic", "threshold", "p-value", "passed", "points to"]
+    for name in names:
+        table.add_column(name, justify="right" if name in ("statistic", "threshold", "p-value") else "left")
+    for test in tests:
+        table.add_row(
+            *[escape(test["output"])] * several,
+            test["name"],
+            f"{test['statistic']:.3g}",
+            f"{test['threshold']:.3g}",
+            f"{test['p_value']:.2g}",
+            "yes" if test["passed"] else "[red]no[/]",
+            escape(test["points_to"]),
+        )
+    return table

@@ -1,0 +1,321 @@
+"""Residuals in time, over frequency, over the input and over the lag."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from gpi_hammerstein._native import Explanation, Model, Record
+from gpi_hammerstein.explanation import is_above
+from gpi_hammerstein.plot.explanation import title
+from gpi_hammerstein.plot.style import BAND, BLACK, BLUE, ORANGE, axes, label
+
+Array = NDArray[np.float64]
+
+# More points than a picture has pixels only make its file large.
+MOST_POINTS = 20_000
+
+# One residual is blue; where there are two, the second is.
+COLOURS = {1: (BLUE,), 2: (ORANGE, BLUE)}
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """One or two residuals of a record, for the pictures.
+
+    Parameters
+    ----------
+    record
+        What was measured.
+    series
+        Names, and measured minus simulated output of each experiment, (samples, outputs).
+    held_out
+        Pairs of first and one past the last held-out sample, of each experiment.
+    noise_rms
+        Noise of each output, in its unit, where it is known.
+    title
+        What is written above.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.residual_spectrum(gpi.plot.Residuals.of_model(model, record))  # doctest: +SKIP
+    """
+
+    record: Record
+    series: Mapping[str, list[Array]]
+    held_out: list[list[tuple[int, int]]]
+    noise_rms: Array | None
+    title: str
+
+    @classmethod
+    def of_model(
+        cls, model: Model, record: Record, *, fit_start: bool = False, remove_mean: bool = False
+    ) -> "Residuals":
+        """Return what a model leaves of a record, as `Model.error` takes it.
+
+        Parameters
+        ----------
+        model
+            Any model.
+        record
+            A record at the model's rate.
+        fit_start, remove_mean
+            As in :meth:`gpi_hammerstein.Model.error`.
+
+        Raises
+        ------
+        ParameterError, DataError
+            The model does not accept the record's input.
+        """
+        left = model.residual(record, fit_start=fit_start)
+        if remove_mean:
+            left = [e - e[start:].mean(axis=0) for e, start in zip(left, record.warmup, strict=True)]
+        return cls(record, {"residual": left}, [[] for _ in left], None, "What the model does not explain")
+
+    @classmethod
+    def of_explanation(cls, found: Explanation) -> "Residuals":
+        """Return the residuals before and after an explanation.
+
+        Parameters
+        ----------
+        found
+            What `explain` returned.
+        """
+        series = {"before": found.residuals_before, "after": found.residuals_after}
+        noise = np.asarray(found.noise_floor["rms"], dtype=np.float64)
+        return cls(found.record, series, found.held_out, noise, title(found))
+
+    def of(self, experiment: int, output: int) -> list[tuple[str, str, Array]]:
+        """Return name, colour and values of every residual of one output.
+
+        Parameters
+        ----------
+        experiment, output
+            Which one, counted from 0.
+        """
+        colours = COLOURS[len(self.series)]
+        return [
+            (name, color, values[experiment][:, output])
+            for (name, values), color in zip(self.series.items(), colours, strict=True)
+        ]
+
+    def limit(self, experiment: int, output: int) -> float:
+        """Return how far an axis reaches; wrong samples and the warm-up must not hide the rest.
+
+        Parameters
+        ----------
+        experiment, output
+            Which one, counted from 0.
+        """
+        scored = self.of(experiment, output)[0][2][self.record.warmup[experiment] :]
+        return 1.5 * float(np.quantile(np.abs(scored), 0.999)) + 1e-300
+
+    def label(self, output: int) -> str:
+        """Return the label of a residual's axis.
+
+        Parameters
+        ----------
+        output
+            Which one, counted from 0.
+        """
+        return label(f"residual of {self.record.output_names[output]}", self.record.output_units[output])
+
+
+def rms(values: Array) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def taken(found: Explanation | Residuals) -> Residuals:
+    """Return the residuals of either."""
+    return found if isinstance(found, Residuals) else Residuals.of_explanation(found)
+
+
+def residual_in_time(
+    found: Explanation | Residuals, ax: Axes | None = None, *, experiment: int = 0, output: int = 0
+) -> Axes:
+    """Draw the residual over time, what is not scored or held out shaded.
+
+    Parameters
+    ----------
+    found
+        What `explain` returned, or residuals.
+    ax
+        Axes to draw on.
+    experiment, output
+        Which one to draw, counted from 0.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.residual_in_time(found)  # doctest: +SKIP
+    """
+    ax = axes(ax, 9.0, 4.0)
+    found = taken(found)
+    warmup, rate = found.record.warmup[experiment], found.record.rate
+    for name, color, values in found.of(experiment, output):
+        t = np.arange(len(values)) / rate
+        text = f"{name}: {rms(values[warmup:]):.3g} {found.record.output_units[output]} rms"
+        ax.plot(t, values, color=color, lw=0.6, label=text)
+    for first, last in [(0, warmup)] * (warmup > 0) + found.held_out[experiment]:
+        ax.axvspan(first / rate, (last - 1) / rate, color=BLACK, alpha=0.08, lw=0)
+    limit = found.limit(experiment, output)
+    ax.set_ylim(-limit, limit)
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel(found.label(output))
+    ax.set_title(found.title + (" (grey: held out)" if found.held_out[experiment] else ""))
+    ax.legend(loc="upper right")
+    return ax
+
+
+def residual_spectrum(
+    found: Explanation | Residuals, ax: Axes | None = None, *, experiment: int = 0, output: int = 0
+) -> Axes:
+    """Draw the residual's amplitude density over frequency.
+
+    Parameters
+    ----------
+    found
+        What `explain` returned, or residuals.
+    ax
+        Axes to draw on.
+    experiment, output
+        Which one to draw, counted from 0.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.residual_spectrum(found)  # doctest: +SKIP
+    """
+    import scipy.signal
+
+    ax = axes(ax)
+    found = taken(found)
+    record = found.record
+    for name, color, values in found.of(experiment, output):
+        scored = values[record.warmup[experiment] :]
+        segment = min(len(scored), 8192)
+        frequency, power = scipy.signal.welch(scored, record.rate, nperseg=segment)
+        # a residual that is zero has no logarithm
+        density = np.sqrt(np.maximum(power[1:], np.finfo(np.float64).tiny))
+        ax.loglog(frequency[1:], density, color=color, lw=0.9, label=name)
+    last = found.of(experiment, output)[-1][2]
+    if found.noise_rms is not None and not is_above(found.noise_rms[output], rms(last)):
+        density = found.noise_rms[output] / np.sqrt(record.rate / 2)
+        ax.axhline(density, color=BLACK, lw=0.8, ls=":", label="noise floor, if white")
+    ax.set_xlabel("frequency [Hz]")
+    unit = record.output_units[output]
+    ax.set_ylabel(label("residual density", f"{unit}/√Hz" if unit else ""))
+    ax.set_title(found.title)
+    ax.grid(True, which="both", lw=0.3)
+    ax.legend(loc="lower left")
+    return ax
+
+
+def residual_over_input(
+    found: Explanation | Residuals,
+    ax: Axes | None = None,
+    *,
+    experiment: int = 0,
+    input: int = 0,
+    output: int = 0,
+) -> Axes:
+    """Draw the residual against the input.
+
+    Parameters
+    ----------
+    found
+        What `explain` returned, or residuals.
+    ax
+        Axes to draw on.
+    experiment, input, output
+        Which one to draw, counted from 0.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.residual_over_input(found)  # doctest: +SKIP
+    """
+    ax = axes(ax)
+    found = taken(found)
+    record = found.record
+    scored = slice(record.warmup[experiment], None)
+    u = record.u[experiment][scored, input]
+    every = max(1, len(u) // MOST_POINTS)
+    for name, color, values in found.of(experiment, output):
+        shown = values[scored][::every]
+        ax.plot(u[::every], shown, ".", ms=1.5, color=color, label=name, rasterized=True)
+    limit = found.limit(experiment, output)
+    ax.set_ylim(-limit, limit)
+    ax.set_xlabel(label(record.input_names[input], record.input_units[input]))
+    ax.set_ylabel(found.label(output))
+    ax.set_title(found.title)
+    ax.legend(loc="upper right", markerscale=6)
+    return ax
+
+
+def residual_autocorrelation(
+    found: Explanation | Residuals,
+    ax: Axes | None = None,
+    *,
+    experiment: int = 0,
+    output: int = 0,
+    lags: int = 50,
+) -> Axes:
+    """Draw the residual's autocorrelation ``r(k) = sum e(t) e(t-k) / sum e(t)^2`` with its 95 % bounds.
+
+    The bounds ``1.96 / sqrt(samples)`` to each side are those of white noise.
+
+    Parameters
+    ----------
+    found
+        What `explain` returned, or residuals.
+    ax
+        Axes to draw on.
+    experiment, output
+        Which one to draw, counted from 0.
+    lags
+        The longest lag, in samples.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.residual_autocorrelation(found)  # doctest: +SKIP
+    """
+    ax = axes(ax)
+    found = taken(found)
+    samples = 1
+    for name, color, values in found.of(experiment, output):
+        scored = values[found.record.warmup[experiment] :]
+        centred = scored - scored.mean()
+        samples = len(centred)
+        power = max(float(centred @ centred), np.finfo(np.float64).tiny)
+        places = np.arange(1, min(lags, samples - 1) + 1)
+        correlation = [float(centred[k:] @ centred[: samples - k]) / power for k in places]
+        ax.plot(places, correlation, ".-", color=color, lw=0.7, ms=4, label=name)
+    bound = BAND / np.sqrt(samples)
+    ax.axhspan(-bound, bound, color=BLACK, alpha=0.12, lw=0, label="95 % of white noise")
+    ax.axhline(0.0, color=BLACK, lw=0.5)
+    ax.set_xlabel("lag [samples]")
+    ax.set_ylabel(f"autocorrelation of the residual of {found.record.output_names[output]}")
+    ax.set_title(found.title)
+    ax.legend(loc="upper right")
+    return ax
