@@ -30,18 +30,17 @@ pub(super) fn flattened(beside: &Beside) -> Vec<Matrix> {
 /// A signal, tapered, with the narrow peaks of its spectrum cut down to what is beside them.
 fn without_lines(values: &[f64]) -> Vec<f64> {
     /// A line is a few places wide; a resonance is wider, and part of the colour.
-    const BESIDE: std::ops::RangeInclusive<usize> = 4..=12;
-    /// Times the median beside it.
+    const NEAR: usize = 4;
+    const FAR: usize = 12;
+    /// Times the median on either side, of which one is higher on a slope.
     const STANDS_OUT: f64 = 12.0;
     let n = values.len();
     let mut spectrum = tapered_spectrum(values);
     let power: Vec<f64> = spectrum[..n / 2].iter().map(Complex64::norm_sqr).collect();
-    let (near, far) = (*BESIDE.start(), *BESIDE.end());
-    for k in near + far..power.len().saturating_sub(far) {
-        let mut around: Vec<f64> =
-            BESIDE.flat_map(|lag| [power[k - lag], power[k + lag]]).collect();
-        around.sort_by(f64::total_cmp);
-        let background = around[around.len() / 2];
+    for k in NEAR + 1..power.len() - NEAR {
+        let below = median(&power[k.saturating_sub(FAR).max(1)..=k - NEAR]);
+        let above = median(&power[k + NEAR..power.len().min(k + FAR + 1)]);
+        let background = below.max(above);
         if power[k] > STANDS_OUT * background {
             let scale = (background / power[k]).sqrt();
             spectrum[k] *= scale;
@@ -60,10 +59,8 @@ pub(super) fn lines(beside: &Beside, output: usize, chance: f64) -> ResidualTest
         for run in experiment.scored_rows(residual) {
             let values = run.column(output);
             for chunk in periodogram(values.as_slice()).chunks_exact(AROUND) {
-                let mut sorted = chunk.to_vec();
-                sorted.sort_by(f64::total_cmp);
-                let median = sorted[AROUND / 2].max(f64::MIN_POSITIVE);
-                most = most.max(sorted[AROUND - 1] / median);
+                let largest = chunk.iter().copied().fold(0.0, f64::max);
+                most = most.max(largest / median(chunk).max(f64::MIN_POSITIVE));
                 count += AROUND as f64;
             }
         }
@@ -88,6 +85,13 @@ fn periodogram(values: &[f64]) -> Vec<f64> {
     }
     let spectrum = tapered_spectrum(values);
     spectrum[SLOWEST..n / 2].iter().map(Complex64::norm_sqr).collect()
+}
+
+/// The upper one of two in the middle.
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The transform of a signal without its mean under Hann's window.

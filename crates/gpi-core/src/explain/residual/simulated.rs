@@ -40,8 +40,8 @@ fn drive() -> Vec<f64> {
         .collect()
 }
 
-/// The tests of the true model where its output has this residual on top.
-fn tested(residual: &[f64]) -> Vec<ResidualTest> {
+/// A record of the true model with this residual on top.
+fn recorded(residual: &[f64]) -> Record {
     let model = model();
     let column = |values: &[f64]| Matrix::from_column_slice(values.len(), 1, values);
     let input = column(&drive());
@@ -49,8 +49,12 @@ fn tested(residual: &[f64]) -> Vec<ResidualTest> {
     let covariates = Matrix::zeros(input.nrows(), 0);
     let run = Experiment { input, output, covariates, warmup: 0, held_out: vec![] };
     let (u, y) = (model.inputs().to_vec(), model.outputs().to_vec());
-    let record = Record::new(vec![run], 1000.0, u, y, vec![]).unwrap();
-    residual_tests(&model, &record, &ResidualOptions::default(), &mut |_, _| true).unwrap()
+    Record::new(vec![run], 1000.0, u, y, vec![]).unwrap()
+}
+
+fn tested(residual: &[f64]) -> Vec<ResidualTest> {
+    let (record, options) = (recorded(residual), ResidualOptions::default());
+    residual_tests(&model(), &record, &options, &mut |_, _| true).unwrap()
 }
 
 fn failed(residual: &[f64]) -> Vec<&'static str> {
@@ -133,6 +137,32 @@ fn a_line_of_any_size_is_found() {
     for size in [0.3, 1.0, 3.0, 10.0, 100.0] {
         let residual = with(size, |k| (0.314 * k as f64).sin());
         assert!(failed(&residual).contains(&"lines"), "{size}");
+    }
+}
+
+#[test]
+fn a_line_is_found_in_short_runs() {
+    for frequency in [0.1, 0.314, 1.5] {
+        let residual = with(1.0, |k| (frequency * k as f64).sin());
+        let mut record = recorded(&residual).experiments()[0].clone();
+        record.held_out = (1..10).map(|i| 400 * i..400 * i + 60).collect();
+        let record = recorded(&residual).with_experiments(vec![record]).unwrap();
+        let options = ResidualOptions::default();
+        let tests = residual_tests(&model(), &record, &options, &mut |_, _| true).unwrap();
+        assert!(tests.iter().any(|t| t.name == "lines" && !t.passed()), "{frequency}");
+    }
+}
+
+#[test]
+fn a_steep_spectrum_has_no_line() {
+    for seed in 0..20 {
+        let mut level = 0.0;
+        let walk = |w: f64| {
+            level += 0.1 * w;
+            level
+        };
+        let residual: Vec<f64> = noise(seed).into_iter().map(walk).collect();
+        assert!(!failed(&residual).contains(&"lines"), "{seed}");
     }
 }
 
