@@ -394,6 +394,7 @@ def explain(
     holdout: Record | None = None,
     *,
     effects: Sequence[str] | None = None,
+    require: Sequence[str] | None = None,
     order: int | None = None,
     half_widths: int | ArrayLike | None = None,
     thresholds: int | ArrayLike | None = None,

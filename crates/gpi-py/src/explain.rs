@@ -208,6 +208,8 @@ impl Explanation {
 ///     out there.
 /// effects : sequence of str, optional
 ///     Names of the effects that may be added (see ``effect_names``); all when left out, none when empty.
+/// require : sequence of str, optional
+///     Names of effects that are added whatever they gain; the step's evidence tells what that is.
 /// order : int, optional
 ///     States of the linear part; a mode that it lacks is then an effect, and a delay too.
 /// half_widths, thresholds : int or array_like, optional
@@ -231,7 +233,7 @@ impl Explanation {
 /// DataError
 ///     As ``identify``.
 /// ParameterError
-///     An effect that is not in the catalogue.
+///     An effect that is not in the catalogue, a required one that the record has nothing to place by.
 ///
 /// Examples
 /// --------
@@ -239,7 +241,7 @@ impl Explanation {
 /// >>> found.effects, found.verdict  # doctest: +SKIP
 /// (['creep'], 'explained')
 #[pyfunction]
-#[pyo3(signature = (record, holdout = None, *, effects = None, order = None, half_widths = None,
+#[pyo3(signature = (record, holdout = None, *, effects = None, require = None, order = None, half_widths = None,
     thresholds = None, delay = None, reading = "one-sided", progress = None))]
 #[allow(clippy::too_many_arguments)]
 fn explain(
@@ -247,6 +249,7 @@ fn explain(
     record: Py<Record>,
     holdout: Option<&Record>,
     effects: Option<Vec<String>>,
+    require: Option<Vec<String>>,
     order: Option<usize>,
     half_widths: Option<&Bound<'_, PyAny>>,
     thresholds: Option<&Bound<'_, PyAny>>,
@@ -262,7 +265,7 @@ fn explain(
         reading: read_reading(reading)?,
         ..IdentifyOptions::default()
     };
-    let options = core::ExplainOptions { identify, effects };
+    let options = core::ExplainOptions { identify, effects, require: require.unwrap_or_default() };
     let own = record.bind(py).borrow();
     let (measured, holdout) = (&own.record, holdout.map(|other| &other.record));
     let found = interruptible_in_part(py, progress, |report| {

@@ -52,6 +52,10 @@ def explain(
             metavar="A,B",
         ),
     ] = None,
+    require: Annotated[
+        str | None,
+        typer.Option(help="Effects that are added whatever they gain, joined by commas.", metavar="A,B"),
+    ] = None,
     order: Annotated[
         int | None,
         typer.Option(
@@ -103,6 +107,7 @@ def explain(
             record,
             other,
             effects=split_effects(effects),
+            require=split_effects(require),
             order=order,
             half_widths=options.parse_numbers("half_widths", half_widths),
             thresholds=options.parse_numbers("thresholds", thresholds),

@@ -63,7 +63,7 @@ fn without_lags(point: &Point, record: &Record) -> Result<Option<Point>, Error> 
         return Ok(None);
     }
     let mut sections = Sections::from_delayed_state_space(&own.to_state_space()?)?;
-    sections.sections.retain(|section| !section.poles().iter().all(|pole| slow(pole)));
+    sections.sections.retain(|section| !section.poles().iter().all(slow));
     if sections.sections.is_empty() || sections.poles().iter().any(slow) {
         return Ok(None);
     }

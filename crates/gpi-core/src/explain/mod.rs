@@ -39,6 +39,8 @@ pub struct ExplainOptions {
     pub identify: IdentifyOptions,
     /// Names of the effects that may be added; all of the catalogue when `None`.
     pub effects: Option<Vec<String>>,
+    /// Names of effects that are added whatever they gain.
+    pub require: Vec<String>,
 }
 
 /// One step: the declared model, or an effect that was added to it.
@@ -134,6 +136,7 @@ pub fn explain(
     progress: Progress,
 ) -> Result<Explanation, Error> {
     let allowed = search::allowed(options.effects.as_deref())?;
+    let required = search::allowed(Some(&options.require))?;
     record.require_moving()?;
     let training = blocks::hold_out(record)?;
     let identify = usual_grids(&options.identify, &training);
@@ -155,15 +158,23 @@ pub fn explain(
     };
     let mut search = Search::new(prepared, &refined, allowed, order_is_given, measured, moving)?;
     search.repair()?;
-    let interrupted = match search.run(progress) {
-        Err(Error::Interrupted) => true,
-        other => other.map(|()| false)?,
-    };
+    let mut interrupted = is_interrupted(search.run(progress))?;
     search.settle_lags()?;
+    for entry in required {
+        interrupted = interrupted || is_interrupted(search.force(entry, progress))?;
+    }
     let mut patient = |_: &str, _: f64| true;
     let last: Progress = if interrupted { &mut patient } else { progress };
     let refinement = finish(&mut search, interrupted, last)?;
     summarise(record, holdout, &base, search, refinement, interrupted)
+}
+
+/// Whether a search ended because it was to stop: what it has found so far stands.
+fn is_interrupted(result: Result<(), Error>) -> Result<bool, Error> {
+    match result {
+        Err(Error::Interrupted) => Ok(true),
+        other => other.map(|()| false),
+    }
 }
 
 /// Grids that are rich enough for a base model and cheap enough for a search.

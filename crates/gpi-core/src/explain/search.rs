@@ -4,6 +4,7 @@ use super::grid::enriched;
 use super::lags::Before;
 use super::score::{Base, Score, scores};
 use crate::effects::{CATALOGUE, Candidate, Entry, Stage};
+use crate::identify::NoiseFloor;
 use crate::identify::levenberg_marquardt::{FitOptions, Fitted, fit};
 use crate::identify::outliers;
 use crate::identify::point::Point;
@@ -132,6 +133,13 @@ impl<'a> Search<'a> {
         const STRONG: f64 = 0.6;
         /// Where no family promises this much, no fit would reach what an effect has to gain.
         const HOPELESS: f64 = 0.5 * LEAST;
+        /// Far from the noise, what a misfit leaves looks like many effects a little: there an effect must
+        /// take this part of the squares, on what is held out too.
+        const SUBSTANTIAL: f64 = 0.3;
+        /// Squares over those of the noise.
+        const NEAR: f64 = 2.25;
+        /// Effects with a signature that no misfit has.
+        const SIGNED: [&str; 2] = ["periodic-disturbance", "covariate"];
         let mut ranked = self.ranked(progress)?;
         // A strong candidate is looked at first: the grid would bend to what it explains.
         let most = ranked.iter().map(|(_, score)| score.gain).fold(0.0, f64::max);
@@ -150,8 +158,14 @@ impl<'a> Search<'a> {
         }
         // what is explained, less what so many parameters would by chance
         trials.sort_by(|a, b| (b.deviance - b.chance).total_cmp(&(a.deviance - a.chance)));
+        let floor = self.floor()?;
+        let sum = |squares: &[f64]| squares.iter().sum::<f64>();
         let taken = trials.iter().position(|trial| {
-            trial.deviance > trial.chance && is_confirmed(&before, &trial.held_out)
+            let left = (trial.cost / self.cost).max(sum(&trial.held_out) / sum(&before));
+            let weighty = left < 1.0 - SUBSTANTIAL
+                || trial.cost < NEAR * floor
+                || SIGNED.contains(&trial.entry.name);
+            trial.deviance > trial.chance && weighty && is_confirmed(&before, &trial.held_out)
         });
         let Some(taken) = taken else {
             self.last = trials.iter().map(|trial| self.reject(trial, None)).collect();
@@ -203,6 +217,15 @@ impl<'a> Search<'a> {
         Ok(gained)
     }
 
+    /// The squares that noise alone would leave.
+    fn floor(&self) -> Result<f64, Error> {
+        let record = &self.prepared.record;
+        let noise = NoiseFloor::estimate(record, &self.point.residuals(record)?);
+        let weights = &self.options.weighting.outputs;
+        let squares = noise.rms.iter().zip(weights).map(|(rms, weight)| (rms * weight).powi(2));
+        Ok(squares.sum::<f64>() * record.scored() as f64)
+    }
+
     fn base(&self) -> Result<Base<'_>, Error> {
         let Self { point, prepared, options, .. } = self;
         Base::new(point, &prepared.record, options.freedom, &options.weighting)
@@ -223,8 +246,37 @@ impl<'a> Search<'a> {
         Ok((fitted.point, fitted.linearization.cost))
     }
 
-    /// The best candidate of each family, the most promising first.
+    /// Adds an effect that the user asks for, whatever it gains.
+    pub(crate) fn force(&mut self, entry: &'static Entry, progress: Progress) -> Result<(), Error> {
+        if self.point.effects.iter().any(|effect| effect.name() == entry.name) {
+            return Ok(());
+        }
+        let Some((_, score, _)) = self.scored(&[entry], progress)?.into_iter().next() else {
+            let requirement = "the record shows nothing to place it by; leave it out";
+            return Err(Error::parameter("require", entry.name, requirement));
+        };
+        let trial = self.trial(entry, score, progress)?;
+        (self.point, self.cost) = (trial.point.clone(), trial.cost);
+        self.rounds.push(Round { trial, others: Vec::new(), dropped: Vec::new() });
+        self.repair()
+    }
+
+    /// The best candidate of each family that promises something, the most promising first.
     fn ranked(&self, progress: Progress) -> Result<Vec<(&'static Entry, Score)>, Error> {
+        let mut best = self.scored(&self.allowed, progress)?;
+        /// A family that promises less than this part of the best one's need not be fitted.
+        const FAR_BEHIND: f64 = 0.2;
+        let most = best.first().map_or(0.0, |first| first.2);
+        best.retain(|(_, _, worth)| *worth > 0.0 && *worth > FAR_BEHIND * most);
+        Ok(best.into_iter().map(|(entry, score, _)| (entry, score)).collect())
+    }
+
+    /// The best candidate of each family, and by how much its deviance exceeds what its parameters cost.
+    fn scored(
+        &self,
+        families: &[&'static Entry],
+        progress: Progress,
+    ) -> Result<Vec<(&'static Entry, Score, f64)>, Error> {
         let base = self.base()?;
         let values = self.prepared.values();
         let present = |entry: &Entry| self.point.effects.iter().any(|e| e.name() == entry.name);
@@ -232,7 +284,7 @@ impl<'a> Search<'a> {
         let of_use = |entry: &Entry| entry.name != "delay" || self.order_is_given;
         let usable = |entry: &&&Entry| of_use(entry) && (entry.repeats || !present(entry));
         let (mut entries, mut candidates) = (Vec::new(), Vec::new());
-        for &entry in self.allowed.iter().filter(usable) {
+        for &entry in families.iter().filter(usable) {
             let found = base.situation(entry.candidates);
             // before and behind the output stage is the same where there is none
             let elsewhere = found.iter().filter_map(Candidate::elsewhere).filter(|_| self.senses());
@@ -252,11 +304,7 @@ impl<'a> Search<'a> {
             }
         }
         best.sort_by(|a, b| b.2.total_cmp(&a.2));
-        /// A family that promises less than this part of the best one's need not be fitted.
-        const FAR_BEHIND: f64 = 0.2;
-        let most = best.first().map_or(0.0, |first| first.2);
-        best.retain(|(_, _, worth)| *worth > 0.0 && *worth > FAR_BEHIND * most);
-        Ok(best.into_iter().map(|(entry, score, _)| (entry, score)).collect())
+        Ok(best)
     }
 
     /// Fits the whole model with one more effect.
@@ -277,10 +325,6 @@ impl<'a> Search<'a> {
         }
         let record = &self.prepared.record;
         let fitted = fit(start, record, &self.options, entry.name, progress)?;
-        eprintln!(
-            "TRIAL {} gain {} base {} hist {:?} {:?}",
-            entry.name, score.gain, self.cost, fitted.history, fitted.status
-        );
         self.judged(entry, fitted, score.gain, progress)
     }
 

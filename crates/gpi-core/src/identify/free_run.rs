@@ -200,7 +200,7 @@ impl Point {
                 let there = self.output_from(Stage::Dynamics, &moved, experiment, index)?;
                 Ok((there - here) / step)
             };
-            let rows = slopes.row_iter().map(|row| row.into_owned());
+            let rows = slopes.row_iter().map(nalgebra::Matrix::into_owned);
             return steps.into_iter().zip(rows).map(column).collect();
         }
         let column = |(number, step): (usize, f64)| {

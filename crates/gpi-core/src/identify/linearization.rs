@@ -5,6 +5,7 @@ use super::stream::Stream;
 use crate::linear::NormalEquations;
 use crate::{Error, Matrix, Record};
 use nalgebra::DVector;
+use std::sync::mpsc::sync_channel;
 
 /// How residuals count.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,29 +82,33 @@ impl Linearization {
         check: &mut dyn FnMut() -> Result<(), Error>,
     ) -> Result<Self, Error> {
         let layout = Layout::new(point, freedom);
-        let mut equations = NormalEquations::zeros(layout.len, 1);
-        let mut cost = 0.0;
-        for (index, experiment) in record.experiments().iter().enumerate() {
-            check()?;
-            let mut stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
-            stream.run(&mut |rows| {
+        let unknowns = layout.len;
+        std::thread::scope(|scope| {
+            // one thread makes rows while another one gathers them
+            let (send, receive) = sync_channel::<(Vec<Matrix>, Matrix)>(2);
+            let gathering = scope.spawn(move || {
+                let mut gathered = Gathered::new(unknowns);
+                receive.iter().for_each(|(rows, residuals)| {
+                    gathered.add(rows, &residuals, weighting);
+                });
+                gathered
+            });
+            for (index, experiment) in record.experiments().iter().enumerate() {
                 check()?;
-                for (output, regressor) in rows.regressors.iter().enumerate() {
-                    let mut regressor = regressor.clone();
-                    let mut target = rows.residuals.row(output).into_owned();
-                    for (mut row, value) in regressor.column_iter_mut().zip(target.iter_mut()) {
-                        let (weight, loss) = weighting.of(output, *value);
-                        cost += loss;
-                        row *= weight.sqrt();
-                        *value *= weight.sqrt();
-                    }
-                    let target = Matrix::from_row_slice(1, target.len(), target.as_slice());
-                    equations.add(&regressor, &target);
-                }
-                Ok(())
-            })?;
-        }
-        Ok(Self { equations, layout, cost })
+                let mut stream =
+                    Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
+                stream.run(&mut |rows| {
+                    check()?;
+                    // only a panic ends the other thread early, and joining it tells
+                    let _ = send.send((rows.regressors.to_vec(), rows.residuals.clone()));
+                    Ok(())
+                })?;
+            }
+            drop(send);
+            let Gathered { equations, cost } =
+                gathering.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            Ok(Self { equations, layout: layout.clone(), cost })
+        })
     }
 
     /// Half the steepest descent of the cost.
@@ -114,5 +119,32 @@ impl Linearization {
     /// By how much the cost falls with a step if the model were linear.
     pub(crate) fn predicted(&self, step: &DVector<f64>) -> f64 {
         2.0 * step.dot(&self.descent()) - (&self.equations.gram * step).dot(step)
+    }
+}
+
+/// Rows gathered so far.
+struct Gathered {
+    equations: NormalEquations,
+    cost: f64,
+}
+
+impl Gathered {
+    fn new(unknowns: usize) -> Self {
+        Self { equations: NormalEquations::zeros(unknowns, 1), cost: 0.0 }
+    }
+
+    /// Adds a block: regressors (unknowns, samples) of every output, and residuals (outputs, samples).
+    fn add(&mut self, regressors: Vec<Matrix>, residuals: &Matrix, weighting: &Weighting) {
+        for (output, mut regressor) in regressors.into_iter().enumerate() {
+            let mut target = residuals.row(output).into_owned();
+            for (mut row, value) in regressor.column_iter_mut().zip(target.iter_mut()) {
+                let (weight, loss) = weighting.of(output, *value);
+                self.cost += loss;
+                row *= weight.sqrt();
+                *value *= weight.sqrt();
+            }
+            let target = Matrix::from_row_slice(1, target.len(), target.as_slice());
+            self.equations.add(&regressor, &target);
+        }
     }
 }

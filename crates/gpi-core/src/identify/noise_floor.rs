@@ -47,28 +47,29 @@ impl NoiseFloor {
     /// Estimates the noise of a record, given a model's `residuals` (samples x outputs, one an
     /// experiment).
     ///
-    /// Differences between repeated periods come first: `var(y(k + P) - y(k)) / 2`. Without
+    /// Differences of the residual between repeated periods come first: `var(e(k + P) - e(k)) / 2`. Without
     /// repetitions the rests are taken: the second half of every stretch of at least 100 samples in
-    /// which no input changes, its straight line removed, those left out in which the output still rings. Without rests what is left is the residual's
-    /// power density near half the sampling rate.
+    /// which no input changes, its straight line removed, those left out in which the output still rings.
+    /// Without rests what is left is the residual's power density near half the sampling rate.
+    ///
+    /// The residual, and not the output: what the model explains of a disturbance is no noise.
     pub fn estimate(record: &Record, residuals: &[Matrix]) -> Self {
-        Self::from_periods(record)
-            .or_else(|| Self::from_rests(record))
+        Self::from_periods(record, residuals)
+            .or_else(|| Self::from_rests(record, residuals))
             .unwrap_or_else(|| Self::from_residuals(record, residuals))
     }
 
-    fn from_periods(record: &Record) -> Option<Self> {
+    fn from_periods(record: &Record, residuals: &[Matrix]) -> Option<Self> {
         let mut squares = DVector::zeros(record.outputs().len());
         let (mut count, mut shortest) = (0.0, usize::MAX);
-        for experiment in record.experiments() {
+        for (residual, experiment) in residuals.iter().zip(record.experiments()) {
             let Some(period) = period(&experiment.input) else { continue };
             shortest = shortest.min(period);
-            let samples = experiment.output.nrows();
+            let samples = residual.nrows();
             // The first of three periods or more still carries the transient of the start.
             let first = if samples >= 3 * period { period } else { 0 };
             let rows = (samples - period).saturating_sub(first);
-            let difference =
-                experiment.output.rows(first + period, rows) - experiment.output.rows(first, rows);
+            let difference = residual.rows(first + period, rows) - residual.rows(first, rows);
             for (sum, column) in squares.iter_mut().zip(difference.column_iter()) {
                 *sum += 0.5 * column.add_scalar(-column.mean()).norm_squared();
             }
@@ -79,16 +80,16 @@ impl NoiseFloor {
             .then_some(Self { rms, method: NoiseMethod::RepeatedPeriods { period: shortest } })
     }
 
-    fn from_rests(record: &Record) -> Option<Self> {
+    fn from_rests(record: &Record, residuals: &[Matrix]) -> Option<Self> {
         /// The shortest stretch that counts, and the fewest samples that make an estimate.
         const SHORTEST: usize = 100;
         const FEWEST: usize = 200;
         // Sums of squares around a line, and their degrees of freedom.
         let mut found: Vec<(DVector<f64>, f64)> = Vec::new();
-        for experiment in record.experiments() {
+        for (residual, experiment) in residuals.iter().zip(record.experiments()) {
             for (start, end) in rests(experiment).into_iter().filter(|(a, b)| b - a >= SHORTEST) {
                 let rows = (end - start) / 2;
-                let output = experiment.output.rows(end - rows, rows);
+                let output = residual.rows(end - rows, rows);
                 let squares = output.column_iter().map(|column| around_a_line(&column.into()));
                 found.push((DVector::from_iterator(output.ncols(), squares), rows as f64 - 2.0));
             }

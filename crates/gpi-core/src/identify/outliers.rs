@@ -36,14 +36,14 @@ pub(crate) fn count(residuals: &[Matrix], record: &Record) -> usize {
 /// The scored samples of signals (samples, outputs) that stand apart, `[experiment][output]`.
 ///
 /// A sample stands apart when it differs from the median of its four neighbours by more than six robust
-/// standard deviations of such differences, and by four times more than the samples a little further away
+/// standard deviations of such differences, and by four times more than the samples around
 /// (but for `near` of them, which may be wrong themselves): slow or structured signals have none, however
 /// rough, and the fewer the smaller `near` is.
 pub(crate) fn places(signals: &[Matrix], record: &Record, near: usize) -> Vec<Vec<Vec<usize>>> {
     const APART: f64 = 6.0;
     const ALONE: f64 = 4.0;
-    /// Of the samples around; the nearest two have this one among their neighbours.
-    const AROUND: std::ops::RangeInclusive<usize> = 3..=12;
+    /// Of the samples around.
+    const AROUND: std::ops::RangeInclusive<usize> = 1..=12;
     let mut found = vec![vec![Vec::new(); record.outputs().len()]; signals.len()];
     for output in 0..record.outputs().len() {
         let differences: Vec<Vec<f64>> =
