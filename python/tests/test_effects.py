@@ -51,7 +51,7 @@ def wander(samples=SAMPLES, seed=0):
 
 def with_effect(model, **effect):
     described = json.loads(model.to_json())
-    described["effects"] = [effect]
+    described["effects"] = [*described.get("effects", []), effect]
     return gpi.Model.from_json(json.dumps(described))
 
 
@@ -65,6 +65,7 @@ def chain(
     read=None,
     beside=None,
     feedback=None,
+    displace=None,
     sense=None,
     add=None,
 ):
@@ -94,6 +95,8 @@ def chain(
         x = a @ x + b[:, 0] * late[k] + (0 if feedback is None else feedback(y[k]))
     if beside is not None:
         y = y + beside(late)
+    if displace is not None:
+        y = y + displace(np.arange(len(u)) / RATE)
     if sense is not None:
         y = sense(y)
     if add is not None:
@@ -266,6 +269,20 @@ def test_a_covariate_leaks_in(time_constant):
         leak[-1] = pole * lag(x, time_constant)[-1] + (1 - pole) * x[-1]
     np.testing.assert_allclose(model.simulate(u, covariates=x), chain(u) + 0.4 * leak, rtol=0, atol=1e-10)
     np.testing.assert_allclose(model.simulate(u), chain(u), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", ["drift", "periodic-disturbance"])
+def test_what_moves_the_stage_goes_through_the_gap(name):
+    (added, place), (gap_of, sensed) = CASES[name], CASES["backlash"]
+    u = wander()
+    expected = chain(u, displace=place["add"], **sensed)
+    model = with_effect(model_of(plant()), name=name, moves_stage=True, **added)
+    model = with_effect(model, name="backlash", **gap_of)
+    np.testing.assert_allclose(model.simulate(u), expected, rtol=0, atol=1e-10)
+    behind = with_effect(with_effect(model_of(plant()), name=name, **added), name="backlash", **gap_of)
+    np.testing.assert_allclose(behind.simulate(u), chain(u, **place, **sensed), rtol=0, atol=1e-10)
+    found = gpi.sensitivities(model, gpi.Record(u, expected, rate=RATE))
+    assert found["cost"] < 1e-16 * len(u)
 
 
 @pytest.mark.parametrize("name", sorted(CASES))

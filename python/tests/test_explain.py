@@ -70,6 +70,16 @@ def test_only_allowed_effects_are_added():
     assert "drift" not in [other["effect"] for other in found.rejected]
 
 
+def test_a_required_effect_is_added_whatever_it_gains():
+    plant = plants.draw(2, (), None, SECONDS, RATE)
+    record = record_of(plant.record(0))
+    found = gpi.explain(record, effects=[], require=["backlash"])
+    assert found.effects == ["backlash"]
+    assert found.steps[1]["evidence"]["deviance"] < found.steps[1]["evidence"]["chance"]
+    with pytest.raises(gpi.ParameterError, match="`require`.*coloured-noise.*leave it out"):
+        gpi.explain(record, effects=[], require=["coloured-noise"])
+
+
 def test_an_unknown_effect_is_refused():
     plant = plants.draw(1, (), None, SECONDS, RATE)
     with pytest.raises(gpi.ParameterError, match="one of delay, amplifier-slew"):

@@ -59,7 +59,8 @@ fn without_lags(point: &Point, record: &Record) -> Result<Option<Point>, Error> 
         pole.im == 0.0 && pole.re > 0.0 && -1.0 / pole.re.ln() > longest
     };
     let own = point.dynamics.own();
-    if !own.poles().iter().any(slow) {
+    // what acts back drives the states of G as they are
+    if !own.poles().iter().any(slow) || point.loops().next().is_some() {
         return Ok(None);
     }
     let mut sections = Sections::from_delayed_state_space(&own.to_state_space()?)?;

@@ -168,11 +168,11 @@ impl<'a> Search<'a> {
             trial.deviance > trial.chance && weighty && is_confirmed(&before, &trial.held_out)
         });
         let Some(taken) = taken else {
-            self.last = trials.iter().map(|trial| self.reject(trial, None)).collect();
+            self.last = trials.iter().map(|trial| self.reject(trial, None, &before)).collect();
             return Ok(());
         };
         let taken = trials.remove(taken);
-        let others = trials.iter().map(|trial| self.reject(trial, Some(&taken))).collect();
+        let others = trials.iter().map(|trial| self.reject(trial, Some(&taken), &before)).collect();
         self.point = taken.point.clone();
         self.cost = taken.cost;
         if taken.entry.name == "linear-dynamics" && !self.order_is_given {
@@ -383,7 +383,7 @@ impl<'a> Search<'a> {
         (held_out.iter().sum::<f64>() / values.max(1) as f64).sqrt()
     }
 
-    fn reject(&self, trial: &Trial, taken: Option<&Trial>) -> Rejected {
+    fn reject(&self, trial: &Trial, taken: Option<&Trial>, before: &[f64]) -> Rejected {
         let holdout_rms = self.holdout_rms(&trial.held_out);
         let (mut why, mut confounded_with) = (String::new(), Vec::new());
         match taken {
@@ -394,6 +394,9 @@ impl<'a> Search<'a> {
             Some(taken) => why = format!("{} explains more", taken.entry.name),
             None if trial.deviance <= trial.chance => {
                 why.push_str("gains no more than chance would");
+            }
+            None if is_confirmed(before, &trial.held_out) => {
+                why.push_str("takes too little of what is left, which is far above the noise");
             }
             None => why.push_str("is not confirmed by the held-out blocks"),
         }
