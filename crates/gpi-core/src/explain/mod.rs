@@ -244,10 +244,11 @@ fn summarise(
     let before = errors(measured, &base, &residuals_before)?;
     let after = errors(mended, &model, &residuals_after)?;
     let tests = residual::tests_of(&model, mended, &residuals_after)?;
-    let noise: Vec<Effect> = noise::effects(&search, &residuals_after, &tests)?
-        .into_iter()
-        .filter(|effect| search.allowed.iter().any(|entry| entry.name == effect.name()))
-        .collect();
+    let noise: Vec<Effect> =
+        noise::effects(&search, &residuals_after, &tests, &refinement.noise_floor)?
+            .into_iter()
+            .filter(|effect| search.allowed.iter().any(|entry| entry.name == effect.name()))
+            .collect();
     let values = search.prepared.values();
     let mut steps = vec![declared(&before)];
     steps.extend(search.rounds.iter().map(|round| added(round, &search, values)));

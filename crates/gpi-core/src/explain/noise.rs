@@ -4,6 +4,7 @@ use super::residual::{ResidualTest, STRUCTURE};
 use super::search::Search;
 use crate::effects::{ColouredNoise, Effect, Outliers};
 use crate::identify::colour::Colour;
+use crate::identify::{NoiseFloor, NoiseMethod};
 use crate::{Error, Matrix, Record};
 
 /// What is wrong with the noise, when everything else is explained.
@@ -11,6 +12,7 @@ pub(crate) fn effects(
     search: &Search,
     residuals: &[Matrix],
     tests: &[ResidualTest],
+    floor: &NoiseFloor,
 ) -> Result<Vec<Effect>, Error> {
     let mut found = Vec::new();
     found.extend(outliers(search));
@@ -19,7 +21,7 @@ pub(crate) fn effects(
             test.output == output && STRUCTURE.contains(&test.name) && !test.passed()
         };
         if !tests.iter().any(fails) {
-            found.extend(memory(search, residuals, output)?);
+            found.extend(memory(search, residuals, output, floor)?);
         }
     }
     Ok(found)
@@ -45,8 +47,19 @@ fn outliers(search: &Search) -> Option<Effect> {
     (count >= FEWEST).then(|| Outliers { count, samples, size }.into())
 }
 
-/// Noise with memory, if its past predicts it: on the training data, and on what is held out.
-fn memory(search: &Search, residuals: &[Matrix], output: usize) -> Result<Option<Effect>, Error> {
+/// Noise with memory, if its past predicts it: on the training data, and on what is held out; and if it is
+/// there when nothing moves, as far as the record shows that.
+fn memory(
+    search: &Search,
+    residuals: &[Matrix],
+    output: usize,
+    floor: &NoiseFloor,
+) -> Result<Option<Effect>, Error> {
+    /// A residual so many times larger than the noise at rest is the actuator's. Slow noise shows in part
+    /// only while the input rests.
+    const LOUDER: f64 = 2.5;
+    /// Where the input never rests, a residual of so large a part of the span is no sensor's noise.
+    const LOUD: f64 = 0.02;
     /// The part by which the standard deviation must fall.
     const LEAST: f64 = 0.1;
     let colour = Colour::of(residuals, &search.prepared.record);
@@ -56,6 +69,15 @@ fn memory(search: &Search, residuals: &[Matrix], output: usize) -> Result<Option
     }
     let (own, innovation) = one_step(residuals, &search.prepared.record, output, filter);
     let (held_out, predicted) = one_step(residuals, &search.test, output, filter);
+    let outputs = search.prepared.record.experiments().iter().map(|e| e.output.column(output));
+    let span = outputs.map(|column| column.max() - column.min()).fold(0.0, f64::max);
+    let loudest = match floor.method {
+        NoiseMethod::HighFrequencyResidual => LOUD * span,
+        _ => LOUDER * floor.rms[output],
+    };
+    if own > loudest {
+        return Ok(None);
+    }
     let falls = |before: f64, after: f64| after < (1.0 - LEAST) * before;
     let block = ColouredNoise { output, coefficients: filter.clone(), innovation, deviation: own };
     Ok((falls(own, innovation) && falls(held_out, predicted)).then(|| block.into()))
