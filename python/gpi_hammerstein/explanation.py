@@ -116,13 +116,7 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
             yield f"{other['effect']} {other['why']}: this record cannot tell them apart."
     floor = result["noise_floor"]["rms"]
     left = result["error"]["after"]["train"]["rms"]
-    if is_above(floor, left):
-        yield (
-            f"What is left is {left:.4g}{space} rms, less than the {floor:.4g}{space} by which the output "
-            "varies where the input rests or repeats itself: what was missing is in these as well."
-        )
-    else:
-        yield f"What is left is {left:.4g}{space} rms; the noise floor is {floor:.4g}{space}."
+    yield f"What is left is {left:.4g}{space} rms; the noise floor is {floor:.4g}{space}."
     yield from failed_in_words(result["residual"]["tests"])
     yield {
         "explained": "Verdict: explained; the residual shows no more than noise.",
@@ -131,11 +125,6 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
     }[result["verdict"]]
     if result["next_experiment"]:
         yield f"Next: {result['next_experiment']['why']}."
-
-
-def is_above(floor: float, left: float) -> bool:
-    """Return whether a noise floor is above what is left: it was seen with an effect in it, such as hum."""
-    return floor > 1.2 * left
 
 
 def failed_in_words(tests: Iterable[Mapping[str, Any]]) -> Iterator[str]:

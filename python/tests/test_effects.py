@@ -366,6 +366,18 @@ def test_a_slower_amplifier_never_overshoots(seed, limit):
     [
         ({"name": "backlash", "output": 1, "half_width": 0.1}, "channel 1 of 1"),
         ({"name": "stiffness", "output": 0, "drives": [0.0] * 20, "scale": 1.0}, "drives 10 states"),
+        (
+            {
+                "name": "hysteresis-shape",
+                "input": 0,
+                "coefficients": [0.1],
+                "widths": 0,
+                "middle": 0.0,
+                "scale": 1.0,
+                "widest": 1.0,
+            },
+            "1 coefficients in rows of 0",
+        ),
         ({"name": "magic"}, "magic"),
     ],
 )

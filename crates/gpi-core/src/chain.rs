@@ -66,6 +66,9 @@ impl Model {
             if block.values().iter().any(|value| !value.is_finite()) {
                 return Err(requirement("its values must be finite".to_owned()));
             }
+            if let Some(flaw) = block.flaw() {
+                return Err(requirement(flaw));
+            }
             let (drives, states) = (block.feedback(0.0).len(), self.linear().order());
             if drives > states {
                 let what = format!("drives {drives} states, but the dynamics have {states}");

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from gpi_hammerstein._native import Explanation, Model, Record
-from gpi_hammerstein.explanation import is_above
 from gpi_hammerstein.plot.explanation import title
 from gpi_hammerstein.plot.style import BAND, BLACK, BLUE, ORANGE, axes, label
 
@@ -209,8 +208,7 @@ def residual_spectrum(
         # a residual that is zero has no logarithm
         density = np.sqrt(np.maximum(power[1:], np.finfo(np.float64).tiny))
         ax.loglog(frequency[1:], density, color=color, lw=0.9, label=name)
-    last = found.of(experiment, output)[-1][2]
-    if found.noise_rms is not None and not is_above(found.noise_rms[output], rms(last)):
+    if found.noise_rms is not None:
         density = found.noise_rms[output] / np.sqrt(record.rate / 2)
         ax.axhline(density, color=BLACK, lw=0.8, ls=":", label="noise floor, if white")
     ax.set_xlabel("frequency [Hz]")

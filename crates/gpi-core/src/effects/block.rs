@@ -117,6 +117,11 @@ pub trait Block {
     /// A small change of each value, in which the output changes linearly.
     fn steps(&self) -> Vec<f64>;
 
+    /// Why these parameters make no block, where finite values do not suffice.
+    fn flaw(&self) -> Option<String> {
+        None
+    }
+
     /// What an engineer would call its parameters.
     fn quantities(&self, units: Units) -> Vec<Quantity>;
 

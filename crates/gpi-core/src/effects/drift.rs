@@ -2,7 +2,7 @@
 
 use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units, knots};
 
-/// `y += d(t)`, d a slow function of time: straight lines between evenly spaced knots, the first of which
+/// `y += d(t)`, d a slow function of time: a smooth curve through evenly spaced knots, the first of which
 /// is 0 (the offset at the start is the model's).
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Drift {

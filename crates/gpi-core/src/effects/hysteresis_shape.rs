@@ -4,7 +4,7 @@ use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
 /// Plays read through curves: `v = sum_i p_i (F_i + s q(f_i, r_i))` with `f_i = (F_i - m) / s` and
 /// `dq/df = sum_a sum_b c_ab P_a(f) P_b(2 r / R - 1)`, a = 1 .. A, b = 0 .. B - 1, P Legendre's
-/// polynomials, q = 0 at both ends of the plays' range and beyond. The play of half-width 0 is read as it
+/// polynomials, q = 0 at both ends of the plays' range and beyond; r beyond R counts as R. The play of half-width 0 is read as it
 /// is: its curve is the envelope's.
 ///
 /// Sums of curves of plays are the Preisach operators (1 + dq/df is their density over the half-plane of
@@ -112,6 +112,14 @@ impl Block for HysteresisShape {
             |place: usize| format!("density[{}][{}]", 1 + place / self.widths, place % self.widths);
         let values = self.coefficients.iter().enumerate();
         values.map(|(place, &value)| Quantity::new(name(place), "", value)).collect()
+    }
+
+    fn flaw(&self) -> Option<String> {
+        let (count, widths) = (self.coefficients.len(), self.widths);
+        let fits = (1..=MOST).contains(&widths) && count % widths == 0 && count / widths <= MOST;
+        (!fits).then(|| {
+            format!("{count} coefficients in rows of {widths}; at most {MOST} rows of {MOST}")
+        })
     }
 
     fn read(&self, half_width: f64, place: f64) -> (f64, f64) {

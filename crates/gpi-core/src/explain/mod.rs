@@ -13,8 +13,10 @@ mod grid;
 mod lags;
 mod noise;
 mod residual;
+mod revision;
 mod score;
 mod search;
+mod trial;
 mod verdict;
 
 use crate::effects::Effect;
@@ -27,9 +29,9 @@ use crate::identify::residuals_from_fitted_start;
 use crate::identify::{Grid, IdentifyOptions, Parameter, Progress, Refinement};
 use crate::{Error, Matrix, Model, Record, SimulationError};
 pub use residual::{ResidualOptions, ResidualTest, residual_tests};
-pub use search::Rejected;
 use search::{Round, Search};
 use std::ops::Range;
+pub use trial::Rejected;
 pub use verdict::{NextExperiment, Verdict, structured};
 
 /// What an explanation may use.
@@ -135,15 +137,15 @@ pub fn explain(
     options: &ExplainOptions,
     progress: Progress,
 ) -> Result<Explanation, Error> {
-    let allowed = search::allowed(options.effects.as_deref())?;
-    let required = search::allowed(Some(&options.require))?;
+    let allowed = search::allowed("effects", options.effects.as_deref())?;
+    let required = search::allowed("require", Some(&options.require))?;
     record.require_moving()?;
     let training = blocks::hold_out(record)?;
     let identify = usual_grids(&options.identify, &training);
     // Spikes that stand out of the output itself.
     let outputs: Vec<Matrix> = training.experiments().iter().map(|e| e.output.clone()).collect();
-    let spikes = crate::identify::outliers::places(&outputs, &search::everything(&training)?, 0);
-    let training = search::repaired(&training, &outputs, &spikes)?;
+    let spikes = crate::identify::outliers::places(&outputs, &revision::everything(&training)?, 0);
+    let training = revision::repaired(&training, &outputs, &spikes)?;
     let mut prepared = prepare(&training, &identify)?;
     let measured = as_measured(&prepared.record, record, &prepared.means)?;
     let mut refined = compare(&mut prepared, &identify, true, progress)?.refined;

@@ -3,44 +3,15 @@
 use super::grid::enriched;
 use super::lags::Before;
 use super::score::{Base, Score, scores};
-use crate::effects::{CATALOGUE, Candidate, Entry, Stage};
+use super::trial::{LEAST, Rejected, Trial, is_confirmed};
+use crate::effects::{CATALOGUE, Candidate, Entry};
 use crate::identify::NoiseFloor;
-use crate::identify::levenberg_marquardt::{FitOptions, Fitted, fit};
-use crate::identify::outliers;
+use crate::identify::levenberg_marquardt::{FitOptions, fit};
 use crate::identify::point::Point;
-use crate::identify::preparation::{Prepared, rescale};
+use crate::identify::preparation::Prepared;
 use crate::identify::refine::{RefineOptions, Refined, settings};
 use crate::identify::{Progress, report};
-use crate::{Error, Matrix, Record};
-
-/// What a fit with one more effect brought.
-#[derive(Clone)]
-pub(crate) struct Trial {
-    pub entry: &'static Entry,
-    pub point: Point,
-    pub cost: f64,
-    /// `N ln(cost before / cost after)`.
-    pub deviance: f64,
-    /// What chance alone would give at most, with the colour of the residual that is left.
-    pub chance: f64,
-    /// Sum of squares of what is held out, block by block.
-    pub held_out: Vec<f64>,
-    /// The part of the residual that the score test promised.
-    pub promised: f64,
-}
-
-/// An effect that was tried and not taken.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Rejected {
-    /// The effect.
-    pub effect: &'static str,
-    /// Root mean square error with it on the held-out blocks.
-    pub holdout_rms: f64,
-    /// Why it was not taken.
-    pub why: String,
-    /// Effects that explain the same.
-    pub confounded_with: Vec<&'static str>,
-}
+use crate::{Error, Record};
 
 /// A round of the search.
 #[derive(Clone)]
@@ -50,9 +21,6 @@ pub(crate) struct Round {
     /// Effects that an earlier round had taken and that this one made superfluous.
     pub dropped: Vec<&'static str>,
 }
-
-/// An effect that takes a smaller part of the residual's squares is of no use to anyone.
-const LEAST: f64 = 0.04;
 
 pub(crate) struct Search<'a> {
     pub prepared: Prepared<'a>,
@@ -306,238 +274,18 @@ impl<'a> Search<'a> {
         best.sort_by(|a, b| b.2.total_cmp(&a.2));
         Ok(best)
     }
-
-    /// Fits the whole model with one more effect.
-    fn trial(
-        &self,
-        entry: &'static Entry,
-        score: Score,
-        progress: Progress,
-    ) -> Result<Trial, Error> {
-        /// Where the start that the score test suggests is worse than the model without the effect by this
-        /// factor of the squares, it is beyond what is linear.
-        const BEYOND: f64 = 10.0;
-        let mut start = self.point.with_effect(score.start);
-        if let Some(zero) = score.zero
-            && self.squares(&start, &self.prepared.record)?.iter().sum::<f64>() > BEYOND * self.cost
-        {
-            start = self.point.with_effect(zero);
-        }
-        let record = &self.prepared.record;
-        let fitted = fit(start, record, &self.options, entry.name, progress)?;
-        self.judged(entry, fitted, score.gain, progress)
-    }
-
-    fn judged(
-        &self,
-        entry: &'static Entry,
-        fitted: Fitted,
-        promised: f64,
-        progress: Progress,
-    ) -> Result<Trial, Error> {
-        let (cost, values) = (fitted.linearization.cost, self.prepared.values());
-        let point = fitted.point.clone();
-        let added = fitted.linearization.layout.len.saturating_sub(self.layout_len());
-        /// Candidates that a round looks at: the best of so many must be better than one.
-        const LOOKS: f64 = 150.0;
-        let deviance = values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln();
-        let white = added.max(1) as f64 * values.ln() + 2.0 * LOOKS.ln();
-        let mut chance = white.max(LEAST * values);
-        if deviance > chance {
-            let refined =
-                Refined { fitted, options: self.options.clone(), outliers: 0, robust: false };
-            let uncertainty = refined.uncertainty(&self.prepared, progress)?;
-            let colour = uncertainty.used / uncertainty.estimated.max(1) as f64;
-            chance = chance.max(colour * white);
-        }
-        let held_out = self.held_out(&point)?;
-        Ok(Trial { entry, point, cost, deviance, chance, held_out, promised })
-    }
-
-    fn layout_len(&self) -> usize {
-        crate::identify::point::Layout::new(&self.point, self.options.freedom).len
-    }
-
-    /// Sum of squares of every held-out block.
-    fn held_out(&self, point: &Point) -> Result<Vec<f64>, Error> {
-        self.squares(point, &self.test)
-    }
-
-    /// Sum of squares of every run that `scored` scores.
-    fn squares(&self, point: &Point, scored: &Record) -> Result<Vec<f64>, Error> {
-        // run over the training record, whose starts were fitted
-        let residuals = point.residuals(&self.prepared.record)?;
-        let weights = &self.options.weighting.outputs;
-        let mut sums = Vec::new();
-        for (residual, experiment) in residuals.iter().zip(scored.experiments()) {
-            for run in experiment.scored_rows(residual) {
-                let columns = run.column_iter().zip(weights);
-                sums.push(columns.map(|(c, w)| w * w * c.norm_squared()).sum());
-            }
-        }
-        Ok(sums)
-    }
-
-    pub(crate) fn holdout_rms(&self, held_out: &[f64]) -> f64 {
-        let values = self.test.scored() * self.test.outputs().len();
-        (held_out.iter().sum::<f64>() / values.max(1) as f64).sqrt()
-    }
-
-    fn reject(&self, trial: &Trial, taken: Option<&Trial>, before: &[f64]) -> Rejected {
-        let holdout_rms = self.holdout_rms(&trial.held_out);
-        let (mut why, mut confounded_with) = (String::new(), Vec::new());
-        match taken {
-            Some(taken) if trial.deviance > taken.deviance - taken.chance => {
-                why = format!("explains as much as {}", taken.entry.name);
-                confounded_with.push(taken.entry.name);
-            }
-            Some(taken) => why = format!("{} explains more", taken.entry.name),
-            None if trial.deviance <= trial.chance => {
-                why.push_str("gains no more than chance would");
-            }
-            None if is_confirmed(before, &trial.held_out) => {
-                why.push_str("takes too little of what is left, which is far above the noise");
-            }
-            None => why.push_str("is not confirmed by the held-out blocks"),
-        }
-        Rejected { effect: trial.entry.name, holdout_rms, why, confounded_with }
-    }
-
-    /// Whether the model has an output stage.
-    fn senses(&self) -> bool {
-        self.point.at_stage(Stage::Output).next().is_some()
-    }
-
-    /// Puts what is added to the other side of the output stage where that explains more.
-    fn rearrange(&mut self, progress: Progress) -> Result<(), Error> {
-        /// The part by which the residual's squares must fall.
-        const LEAST: f64 = 0.01;
-        if !self.senses() {
-            return Ok(());
-        }
-        let record = &self.prepared.record;
-        for place in 0..self.point.effects.len() {
-            let Some(other) = self.point.effects[place].block().elsewhere() else { continue };
-            let moved = self.point.without_effect(place).with_effect(other);
-            let fitted = fit(moved, record, &self.options, "rearrangement", progress)?;
-            if fitted.linearization.cost < (1.0 - LEAST) * self.cost {
-                (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
-            }
-        }
-        Ok(())
-    }
-
-    /// Drops effects that a later one has made superfluous.
-    fn backward(&mut self, progress: Progress) -> Result<(), Error> {
-        let mut place = 0;
-        while self.point.effects.len() > 1 && place < self.point.effects.len() {
-            let entry = self.point.effects[place].entry();
-            let newest = self.rounds.last().map(|round| round.trial.entry.name);
-            if Some(entry.name) == newest {
-                place += 1;
-                continue;
-            }
-            let without = self.point.without_effect(place);
-            let record = &self.prepared.record;
-            let fitted = fit(without, record, &self.options, "backward step", progress)?;
-            let lost = self.prepared.values() * (fitted.linearization.cost / self.cost).ln();
-            let chance = self.rounds.last().map_or(0.0, |round| round.trial.chance);
-            if lost < chance {
-                (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
-                if let Some(round) = self.rounds.last_mut() {
-                    round.dropped.push(entry.name);
-                }
-            } else {
-                place += 1;
-            }
-        }
-        Ok(())
-    }
-
-    /// Makes modes that were found parts of G.
-    fn absorb_modes(&mut self) {
-        while let Some(place) =
-            self.point.effects.iter().position(|effect| effect.name() == "linear-dynamics")
-        {
-            for section in &mut self.point.dynamics.sections {
-                section.beside = match section.beside {
-                    Some(own) if own == place => None,
-                    Some(own) if own > place => Some(own - 1),
-                    other => other,
-                };
-            }
-            self.point.effects.remove(place);
-        }
-        rescale(&mut self.point);
-    }
-
-    /// Replaces isolated outliers of the residual by what their neighbours say, also where the record is
-    /// held out: a wrong sample says nothing about a model.
-    ///
-    /// Each time from what was measured: samples that an effect makes stand apart are wrong only until it
-    /// is known.
-    pub(crate) fn repair(&mut self) -> Result<(), Error> {
-        let residuals = self.point.residuals(&self.measured)?;
-        self.wrong = outliers::places(&residuals, &everything(&self.measured)?, 0);
-        self.prepared.record = repaired(&self.measured, &residuals, &self.wrong)?;
-        // what the next fits are compared with
-        self.cost = self.squares(&self.point, &self.prepared.record)?.iter().sum();
-        Ok(())
-    }
-}
-
-/// Whether what is held out has become smaller by more than chance: in the mean of the blocks, or in
-/// some blocks (those in which the effect shows) and hardly worse in any other.
-fn is_confirmed(before: &[f64], after: &[f64]) -> bool {
-    /// The least part by which the sum must fall.
-    const LEAST: f64 = 5e-3;
-    /// Standard errors of the mean difference.
-    const ERRORS: f64 = 1.7;
-    /// How much more the better blocks must gain than the worse ones lose.
-    const ONE_SIDED: f64 = 10.0;
-    let differences: Vec<f64> = before.iter().zip(after).map(|(a, b)| a - b).collect();
-    let n = differences.len() as f64;
-    let mean = differences.iter().sum::<f64>() / n;
-    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    let total: f64 = before.iter().sum();
-    let gained: f64 = differences.iter().filter(|d| **d > 0.0).sum();
-    let lost: f64 = -differences.iter().filter(|d| **d < 0.0).sum::<f64>();
-    let one_sided = gained > ONE_SIDED * lost;
-    mean * n > LEAST * total && (one_sided || mean > ERRORS * (variance / n).sqrt())
-}
-
-/// The record with nothing held out.
-pub(crate) fn everything(record: &Record) -> Result<Record, Error> {
-    let mut experiments = record.experiments().to_vec();
-    experiments.iter_mut().for_each(|experiment| experiment.held_out.clear());
-    record.with_experiments(experiments)
-}
-
-/// The record with samples at `places` set to what makes their residual that of their neighbours.
-pub(crate) fn repaired(
-    record: &Record,
-    residuals: &[Matrix],
-    places: &[Vec<Vec<usize>>],
-) -> Result<Record, Error> {
-    let mut experiments = record.experiments().to_vec();
-    for ((experiment, residual), places) in experiments.iter_mut().zip(residuals).zip(places) {
-        for (output, places) in places.iter().enumerate() {
-            for &k in places {
-                let beside = 0.5 * (residual[(k - 1, output)] + residual[(k + 1, output)]);
-                experiment.output[(k, output)] += beside - residual[(k, output)];
-            }
-        }
-    }
-    record.with_experiments(experiments)
 }
 
 /// The entries that `names` allow, all when there are none.
-pub(crate) fn allowed(names: Option<&[String]>) -> Result<Vec<&'static Entry>, Error> {
+pub(crate) fn allowed(
+    parameter: &'static str,
+    names: Option<&[String]>,
+) -> Result<Vec<&'static Entry>, Error> {
     let Some(names) = names else { return Ok(CATALOGUE.iter().collect()) };
     let find = |name: &String| {
         CATALOGUE.iter().find(|entry| entry.name == name).ok_or_else(|| {
             let known: Vec<&str> = CATALOGUE.iter().map(|entry| entry.name).collect();
-            Error::parameter("effects", name, format!("one of {}", known.join(", ")))
+            Error::parameter(parameter, name, format!("one of {}", known.join(", ")))
         })
     };
     names.iter().map(find).collect()

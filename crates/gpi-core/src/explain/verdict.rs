@@ -1,7 +1,7 @@
 //! What an explanation comes to, and what to measure next.
 
 use super::residual::{ResidualTest, STRUCTURE};
-use super::search::Rejected;
+use super::trial::Rejected;
 use crate::Record;
 
 /// How far what was measured is explained.

@@ -1,0 +1,160 @@
+//! One more effect, fitted jointly with the whole model and judged.
+
+use super::score::Score;
+use super::search::Search;
+use crate::effects::Entry;
+use crate::identify::Progress;
+use crate::identify::levenberg_marquardt::{Fitted, fit};
+use crate::identify::point::{Layout, Point};
+use crate::identify::refine::Refined;
+use crate::{Error, Record};
+
+/// An effect that takes a smaller part of the residual's squares is of no use to anyone.
+pub(super) const LEAST: f64 = 0.04;
+
+/// What a fit with one more effect brought.
+#[derive(Clone)]
+pub(crate) struct Trial {
+    pub entry: &'static Entry,
+    pub point: Point,
+    pub cost: f64,
+    /// `N ln(cost before / cost after)`.
+    pub deviance: f64,
+    /// What chance alone would give at most, with the colour of the residual that is left.
+    pub chance: f64,
+    /// Sum of squares of what is held out, block by block.
+    pub held_out: Vec<f64>,
+    /// The part of the residual that the score test promised.
+    pub promised: f64,
+}
+
+/// An effect that was tried and not taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rejected {
+    /// The effect.
+    pub effect: &'static str,
+    /// Root mean square error with it on the held-out blocks.
+    pub holdout_rms: f64,
+    /// Why it was not taken.
+    pub why: String,
+    /// Effects that explain the same.
+    pub confounded_with: Vec<&'static str>,
+}
+
+impl Search<'_> {
+    /// Fits the whole model with one more effect.
+    pub(super) fn trial(
+        &self,
+        entry: &'static Entry,
+        score: Score,
+        progress: Progress,
+    ) -> Result<Trial, Error> {
+        /// Where the start that the score test suggests is worse than the model without the effect by this
+        /// factor of the squares, it is beyond what is linear.
+        const BEYOND: f64 = 10.0;
+        let mut start = self.point.with_effect(score.start);
+        if let Some(zero) = score.zero
+            && self.squares(&start, &self.prepared.record)?.iter().sum::<f64>() > BEYOND * self.cost
+        {
+            start = self.point.with_effect(zero);
+        }
+        let record = &self.prepared.record;
+        let fitted = fit(start, record, &self.options, entry.name, progress)?;
+        self.judged(entry, fitted, score.gain, progress)
+    }
+
+    pub(super) fn judged(
+        &self,
+        entry: &'static Entry,
+        fitted: Fitted,
+        promised: f64,
+        progress: Progress,
+    ) -> Result<Trial, Error> {
+        let (cost, values) = (fitted.linearization.cost, self.prepared.values());
+        let point = fitted.point.clone();
+        let added = fitted.linearization.layout.len.saturating_sub(self.layout_len());
+        /// Candidates that a round looks at: the best of so many must be better than one.
+        const LOOKS: f64 = 150.0;
+        let deviance = values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln();
+        let white = added.max(1) as f64 * values.ln() + 2.0 * LOOKS.ln();
+        let mut chance = white.max(LEAST * values);
+        if deviance > chance {
+            let refined =
+                Refined { fitted, options: self.options.clone(), outliers: 0, robust: false };
+            let uncertainty = refined.uncertainty(&self.prepared, progress)?;
+            let colour = uncertainty.used / uncertainty.estimated.max(1) as f64;
+            chance = chance.max(colour * white);
+        }
+        let held_out = self.held_out(&point)?;
+        Ok(Trial { entry, point, cost, deviance, chance, held_out, promised })
+    }
+
+    pub(super) fn layout_len(&self) -> usize {
+        Layout::new(&self.point, self.options.freedom).len
+    }
+
+    /// Sum of squares of every held-out block.
+    pub(super) fn held_out(&self, point: &Point) -> Result<Vec<f64>, Error> {
+        self.squares(point, &self.test)
+    }
+
+    /// Sum of squares of every run that `scored` scores.
+    pub(super) fn squares(&self, point: &Point, scored: &Record) -> Result<Vec<f64>, Error> {
+        // run over the training record, whose starts were fitted
+        let residuals = point.residuals(&self.prepared.record)?;
+        let weights = &self.options.weighting.outputs;
+        let mut sums = Vec::new();
+        for (residual, experiment) in residuals.iter().zip(scored.experiments()) {
+            for run in experiment.scored_rows(residual) {
+                let columns = run.column_iter().zip(weights);
+                sums.push(columns.map(|(c, w)| w * w * c.norm_squared()).sum());
+            }
+        }
+        Ok(sums)
+    }
+
+    pub(crate) fn holdout_rms(&self, held_out: &[f64]) -> f64 {
+        let values = self.test.scored() * self.test.outputs().len();
+        (held_out.iter().sum::<f64>() / values.max(1) as f64).sqrt()
+    }
+
+    pub(super) fn reject(&self, trial: &Trial, taken: Option<&Trial>, before: &[f64]) -> Rejected {
+        let holdout_rms = self.holdout_rms(&trial.held_out);
+        let (mut why, mut confounded_with) = (String::new(), Vec::new());
+        match taken {
+            Some(taken) if trial.deviance > taken.deviance - taken.chance => {
+                why = format!("explains as much as {}", taken.entry.name);
+                confounded_with.push(taken.entry.name);
+            }
+            Some(taken) => why = format!("{} explains more", taken.entry.name),
+            None if trial.deviance <= trial.chance => {
+                why.push_str("gains no more than chance would");
+            }
+            None if is_confirmed(before, &trial.held_out) => {
+                why.push_str("takes too little of what is left, which is far above the noise");
+            }
+            None => why.push_str("is not confirmed by the held-out blocks"),
+        }
+        Rejected { effect: trial.entry.name, holdout_rms, why, confounded_with }
+    }
+}
+
+/// Whether what is held out has become smaller by more than chance: in the mean of the blocks, or in
+/// some blocks (those in which the effect shows) and hardly worse in any other.
+pub(super) fn is_confirmed(before: &[f64], after: &[f64]) -> bool {
+    /// The least part by which the sum must fall.
+    const LEAST: f64 = 5e-3;
+    /// Standard errors of the mean difference.
+    const ERRORS: f64 = 1.7;
+    /// How much more the better blocks must gain than the worse ones lose.
+    const ONE_SIDED: f64 = 10.0;
+    let differences: Vec<f64> = before.iter().zip(after).map(|(a, b)| a - b).collect();
+    let n = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / n;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    let total: f64 = before.iter().sum();
+    let gained: f64 = differences.iter().filter(|d| **d > 0.0).sum();
+    let lost: f64 = -differences.iter().filter(|d| **d < 0.0).sum::<f64>();
+    let one_sided = gained > ONE_SIDED * lost;
+    mean * n > LEAST * total && (one_sided || mean > ERRORS * (variance / n).sqrt())
+}
