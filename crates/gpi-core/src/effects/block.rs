@@ -122,6 +122,13 @@ pub trait Block {
         None
     }
 
+    /// Whether a record of so many seconds can show it as it is, and no engineer would call it something
+    /// else.
+    fn is_plausible(&self, duration: f64) -> bool {
+        let _ = duration;
+        true
+    }
+
     /// What an engineer would call its parameters.
     fn quantities(&self, units: Units) -> Vec<Quantity>;
 

@@ -76,6 +76,12 @@ impl Block for Creep {
         times.chain(self.gains.iter().map(|_| 1e-3)).collect()
     }
 
+    /// Creep goes on in one direction, and what is slower than the record is a trend.
+    fn is_plausible(&self, duration: f64) -> bool {
+        let mut gains = self.gains.iter().zip(&self.gains[1..]);
+        gains.all(|(a, b)| a * b >= 0.0) && self.time_constants.iter().all(|&time| time < duration)
+    }
+
     fn quantities(&self, _: Units) -> Vec<Quantity> {
         let mut quantities = Vec::new();
         for (i, (&time, &gain)) in self.time_constants.iter().zip(&self.gains).enumerate() {

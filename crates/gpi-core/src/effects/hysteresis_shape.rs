@@ -103,6 +103,11 @@ impl Block for HysteresisShape {
         self.coefficients.copy_from_slice(values);
     }
 
+    /// A density that differs more from the plays' own than tenfold is no shape but a misfit.
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        vec![(-10.0, 10.0); self.coefficients.len()]
+    }
+
     fn steps(&self) -> Vec<f64> {
         vec![1e-4; self.coefficients.len()]
     }

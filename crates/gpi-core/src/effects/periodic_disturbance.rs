@@ -142,8 +142,23 @@ impl Block for PeriodicDisturbance {
         ]
     }
 
-    fn add(&self, _: &mut [f64], moment: Moment) -> f64 {
-        let (sine, cosine) = (std::f64::consts::TAU * self.frequency * moment.time).sin_cos();
+    /// Samples since the phase was worked out anew, its cosine and sine, and those of one sample's turn.
+    fn rest(&self, _: f64, moment: Moment) -> Vec<f64> {
+        let (sine, cosine) = (std::f64::consts::TAU * self.frequency / moment.rate).sin_cos();
+        vec![0.0, 1.0, 0.0, cosine, sine]
+    }
+
+    /// A turn costs less than a sine; the phase is worked out anew before rounding can add up.
+    fn add(&self, state: &mut [f64], moment: Moment) -> f64 {
+        const TURNS: f64 = 64.0;
+        if state[0] == 0.0 {
+            let phase = std::f64::consts::TAU * self.frequency * moment.time;
+            (state[2], state[1]) = phase.sin_cos();
+        }
+        state[0] = (state[0] + 1.0) % TURNS;
+        let [cosine, sine] = [state[1], state[2]];
+        state[1] = cosine * state[3] - sine * state[4];
+        state[2] = sine * state[3] + cosine * state[4];
         self.cosine * cosine + self.sine * sine
     }
 }

@@ -31,20 +31,42 @@ pub(crate) fn effects(
 fn outliers(search: &Search) -> Option<Effect> {
     /// Fewer may be chance, or the way a record was cut.
     const FEWEST: usize = 3;
-    let (mut count, mut squares) = (0, 0.0);
+    let (mut count, mut driven, mut squares) = (0, 0, 0.0);
     let measured = &search.measured;
     let pairs = measured.experiments().iter().zip(search.prepared.record.experiments());
     for ((given, mended), places) in pairs.zip(&search.wrong) {
+        let after_jumps = after_jumps(&given.input);
         for (output, places) in places.iter().enumerate() {
             for &k in places {
                 count += 1;
+                driven += usize::from(after_jumps[k]);
                 squares += (given.output[(k, output)] - mended.output[(k, output)]).powi(2);
             }
         }
     }
     let samples = measured.samples();
     let size = (squares / count.max(1) as f64).sqrt();
-    (count >= FEWEST).then(|| Outliers { count, samples, size }.into())
+    // samples that stand apart where the input jumps are what the model makes of a jump
+    (count >= FEWEST && 2 * driven < count).then(|| Outliers { count, samples, size }.into())
+}
+
+/// Whether an input jumped shortly before: by more than nearly all of its changes.
+fn after_jumps(input: &Matrix) -> Vec<bool> {
+    const SHORTLY: usize = 8;
+    const NEARLY_ALL: f64 = 0.99;
+    let samples = input.nrows();
+    let mut after = vec![false; samples];
+    for column in input.column_iter() {
+        let change = |k: usize| (column[k] - column[k - 1]).abs();
+        let mut changes: Vec<f64> = (1..samples).map(change).collect();
+        changes.sort_by(f64::total_cmp);
+        let last = changes.len().saturating_sub(1) as f64;
+        let Some(&usual) = changes.get((NEARLY_ALL * last) as usize) else { continue };
+        for k in (1..samples).filter(|&k| change(k) > usual) {
+            after[k..(k + SHORTLY).min(samples)].fill(true);
+        }
+    }
+    after
 }
 
 /// Noise with memory, if its past predicts it: on the training data, and on what is held out; and if it is

@@ -1,23 +1,20 @@
 //! What was found is looked at again once more is known.
 
-use super::search::Search;
-use crate::effects::Stage;
-use crate::identify::levenberg_marquardt::fit;
+use super::ranking::Ranked;
+use super::search::{Round, Search};
+use super::trial::Trial;
+use crate::effects::Entry;
+use crate::identify::levenberg_marquardt::{FitOptions, Fitted, fit};
 use crate::identify::preparation::rescale;
 use crate::identify::{Progress, outliers};
 use crate::{Error, Matrix, Record};
 
 impl Search<'_> {
-    /// Whether the model has an output stage.
-    pub(super) fn senses(&self) -> bool {
-        self.point.at_stage(Stage::Output).next().is_some()
-    }
-
     /// Puts what is added to the other side of the output stage where that explains more.
     pub(super) fn rearrange(&mut self, progress: Progress) -> Result<(), Error> {
         /// The part by which the residual's squares must fall.
         const LEAST: f64 = 0.01;
-        if !self.senses() {
+        if !self.point.senses() {
             return Ok(());
         }
         let record = &self.prepared.record;
@@ -42,9 +39,7 @@ impl Search<'_> {
                 place += 1;
                 continue;
             }
-            let without = self.point.without_effect(place);
-            let record = &self.prepared.record;
-            let fitted = fit(without, record, &self.options, "backward step", progress)?;
+            let fitted = self.without(place, progress)?;
             let lost = self.prepared.values() * (fitted.linearization.cost / self.cost).ln();
             let chance = self.rounds.last().map_or(0.0, |round| round.trial.chance);
             if lost < chance {
@@ -57,6 +52,74 @@ impl Search<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Puts what the input drives in the place of a slow function of time, which fits much, where it explains
+    /// as much.
+    pub(super) fn prefer_driven(&mut self, progress: Progress) -> Result<(), Error> {
+        const SLOW: [&str; 2] = ["drift", "gain-drift"];
+        /// How much larger the squares of what is held out may be.
+        const WORSE: f64 = 1.05;
+        let driven: Vec<&'static Entry> = self
+            .allowed
+            .iter()
+            .copied()
+            .filter(|entry| entry.driven && !SLOW.contains(&entry.name))
+            .collect();
+        for name in SLOW {
+            let Some(place) = self.point.effects.iter().position(|effect| effect.name() == name)
+            else {
+                continue;
+            };
+            let without = self.point.without_effect(place);
+            let best = self.scored_beside(&without, &driven, progress)?.into_iter().next();
+            let Some(Ranked { entry, score, .. }) = best else { continue };
+            let record = &self.prepared.record;
+            let options = FitOptions { steps: 2 * self.options.steps, ..self.options.clone() };
+            let gain = score.gain;
+            let start = self.start(&without, score)?;
+            let fitted = fit(start, record, &options, entry.name, progress)?;
+            let lost = self.prepared.values() * (fitted.linearization.cost / self.cost).ln();
+            let sum = |squares: Vec<f64>| squares.iter().sum::<f64>();
+            let (now, then) = (self.held_out(&self.point)?, self.held_out(&fitted.point)?);
+            let round = self.rounds.iter().find(|round| round.trial.entry.name == name);
+            let Some(Trial { deviance, chance, .. }) = round.map(|round| &round.trial) else {
+                continue;
+            };
+            let longest = record.experiments().iter().map(|e| e.input.nrows()).max();
+            let duration = longest.unwrap_or(0) as f64 / record.rate();
+            let is_plausible =
+                fitted.point.blocks().iter().all(|e| e.block().is_plausible(duration));
+            if lost < *chance && sum(then) < WORSE * sum(now) && is_plausible {
+                // what the slow function had gained, less what was lost with it
+                let deviance = deviance - lost;
+                let judged = self.judged(entry, fitted, gain, progress)?;
+                let trial = Trial { deviance, ..judged };
+                (self.point, self.cost) = (trial.point.clone(), trial.cost);
+                self.rounds.push(Round { trial, others: Vec::new(), dropped: vec![name] });
+                self.repair()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The best fit without one of the effects. The newest starts from the score test anew too: beside the
+    /// one that goes it may have become what no fit leads back from.
+    fn without(&self, place: usize, progress: Progress) -> Result<Fitted, Error> {
+        let record = &self.prepared.record;
+        let without = self.point.without_effect(place);
+        let fitted = fit(without.clone(), record, &self.options, "backward step", progress)?;
+        let newest = self.rounds.last().map(|round| round.trial.entry);
+        let Some(newest) = newest.filter(|entry| entry.driven) else { return Ok(fitted) };
+        let own = without.effects.iter().rposition(|effect| effect.name() == newest.name);
+        let Some(own) = own else { return Ok(fitted) };
+        let point = without.without_effect(own);
+        let best = self.scored_beside(&point, &[newest], progress)?.into_iter().next();
+        let Some(best) = best else { return Ok(fitted) };
+        let start = self.start(&point, best.score)?;
+        let anew = fit(start, record, &self.options, "backward step", progress)?;
+        let is_better = anew.linearization.cost < fitted.linearization.cost;
+        Ok(if is_better { anew } else { fitted })
     }
 
     /// Makes modes that were found parts of G.

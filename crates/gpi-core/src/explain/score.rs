@@ -2,12 +2,13 @@
 
 use crate::effects::{Candidate, Effect, Situation, Stage};
 use crate::identify::free_run::Signals;
-use crate::identify::linearization::{Linearization, Weighting};
+use crate::identify::linearization::{Linearization, Weighting, gather};
 use crate::identify::point::{Freedom, Point};
 use crate::identify::stream::Stream;
 use crate::identify::uncertainty::descending_eigen;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 /// A candidate's score.
 #[derive(Clone, Debug)]
@@ -30,7 +31,7 @@ pub(crate) fn scores(
     check: &mut dyn FnMut(f64) -> Result<(), Error>,
 ) -> Result<Vec<Score>, Error> {
     /// Numbers that the columns held at once may take.
-    const AT_ONCE: usize = 20_000_000;
+    const AT_ONCE: usize = 6_000_000;
     let columns = (AT_ONCE / base.record.samples().max(1)).max(1);
     let mut scores = Vec::new();
     while let Some(first) = candidates.get(scores.len()) {
@@ -134,11 +135,9 @@ impl<'a> Base<'a> {
     fn score(&self, candidates: &[Candidate]) -> Result<Vec<Score>, Error> {
         let probes = candidates.iter().map(|candidate| candidate.probes.len()).sum();
         let columns = |known: &Signals, here: &Matrix, experiment: &Experiment, index: usize| {
-            let mut columns = Vec::new();
-            for candidate in candidates {
-                columns.extend(self.columns(candidate, known, here, experiment, index)?);
-            }
-            Ok(columns)
+            let of = |candidate| self.columns(candidate, known, here, experiment, index);
+            let columns: Result<Vec<_>, Error> = candidates.par_iter().map(of).collect();
+            Ok(columns?.into_iter().flatten().collect())
         };
         let Projection { left, score, squares, cost } = self.project(probes, &columns)?;
         let mut found = Vec::new();
@@ -183,11 +182,8 @@ impl<'a> Base<'a> {
             let columns = point.columns_of(place, known, here, experiment, index)?;
             return Ok(columns.into_iter().zip(block.steps()).map(|(c, step)| c * step).collect());
         }
-        let column = |probe: &Effect| {
-            let (point, stage) = (self.point.with_effect(probe.clone()), probe.block().stage());
-            Ok(point.output_from(stage, known, experiment, index)? - here)
-        };
-        candidate.probes.iter().map(column).collect()
+        let gained = |probe: &Effect| self.point.gained_by(probe, known, here, experiment, index);
+        candidate.probes.par_iter().map(gained).collect()
     }
 
     /// So many columns beside the model's own, projected off its sensitivities. `columns` makes them for an
@@ -205,26 +201,25 @@ impl<'a> Base<'a> {
             let mut first = 0;
             let derivatives = self.freedom.derivatives;
             let layout = &self.linearization.layout;
-            let mut stream = Stream::new(self.point, layout, derivatives, experiment, index)?;
-            stream.run(&mut |rows| {
-                let count = rows.residuals.ncols();
+            let stream = Stream::new(self.point, layout, derivatives, experiment, index)?;
+            gather(stream, &mut || Ok(()), |regressors, residuals| {
+                let count = residuals.ncols();
                 let places = &places[first..first + count];
-                for (output, regressor) in rows.regressors.iter().enumerate() {
+                for (output, regressor) in regressors.iter().enumerate() {
                     let own = Matrix::from_fn(count, n, |row, column| {
                         columns[column][(places[row], output)]
                     });
-                    let residual = rows.residuals.row(output).transpose();
+                    let residual = residuals.row(output).transpose();
                     let weights = residual.map(|value| self.weighting.of(output, value).0);
                     let mut weighted = own.clone();
-                    for (mut row, weight) in weighted.row_iter_mut().zip(weights.iter()) {
-                        row *= *weight;
+                    for mut column in weighted.column_iter_mut() {
+                        column.component_mul_assign(&weights);
                     }
                     cross.gemm(1.0, regressor, &weighted, 1.0);
                     squares.gemm_tr(1.0, &own, &weighted, 1.0);
                     with_residual.gemv_tr(1.0, &weighted, &residual, 1.0);
                 }
                 first += count;
-                Ok(())
             })?;
         }
         let white = self.whitening.transpose() * cross;

@@ -1,10 +1,11 @@
 //! The closed loop: score candidates, fit the best few jointly, keep what the held-out data confirm.
 
+use super::concurrently::concurrently;
 use super::grid::enriched;
 use super::lags::Before;
-use super::score::{Base, Score, scores};
+use super::score::Base;
 use super::trial::{LEAST, Rejected, Trial, is_confirmed};
-use crate::effects::{CATALOGUE, Candidate, Entry};
+use crate::effects::{CATALOGUE, Entry};
 use crate::identify::NoiseFloor;
 use crate::identify::levenberg_marquardt::{FitOptions, fit};
 use crate::identify::point::Point;
@@ -90,7 +91,7 @@ impl<'a> Search<'a> {
                 break;
             }
         }
-        Ok(())
+        self.prefer_driven(progress)
     }
 
     /// One round: takes the best effect, if any is confirmed.
@@ -110,20 +111,17 @@ impl<'a> Search<'a> {
         const SIGNED: [&str; 2] = ["periodic-disturbance", "covariate"];
         let mut ranked = self.ranked(progress)?;
         // A strong candidate is looked at first: the grid would bend to what it explains.
-        let most = ranked.iter().map(|(_, score)| score.gain).fold(0.0, f64::max);
+        let most = ranked.iter().map(|one| one.score.gain).fold(0.0, f64::max);
         if most < STRONG && !self.is_rich && self.enrich(progress)? {
             ranked = self.ranked(progress)?;
         }
-        if ranked.iter().all(|(_, score)| score.gain < HOPELESS) {
+        if ranked.iter().all(|one| one.score.gain < HOPELESS) {
             self.last.clear();
             return Ok(());
         }
         let before = self.held_out(&self.point)?;
-        let mut trials = Vec::new();
-        for (entry, score) in ranked.into_iter().take(FITTED) {
-            report(progress, entry.name, 0.0)?;
-            trials.push(self.trial(entry, score, progress)?);
-        }
+        ranked.truncate(FITTED);
+        let mut trials = concurrently(ranked, progress, |one, progress| self.trial(one, progress))?;
         // what is explained, less what so many parameters would by chance
         trials.sort_by(|a, b| (b.deviance - b.chance).total_cmp(&(a.deviance - a.chance)));
         let floor = self.floor()?;
@@ -201,11 +199,15 @@ impl<'a> Search<'a> {
 
     /// A point fitted with grids that move, plays and deadzones without use left out; and its cost.
     fn on_moving_grids(&self, point: Point, progress: Progress) -> Result<(Point, f64), Error> {
-        const STEPS: usize = 15;
+        const STILL: usize = 6;
+        const STEPS: usize = 12;
         let mut options = settings(&self.prepared, &self.moving, STEPS);
         options.weighting = self.options.weighting.clone();
         options.gain = 1e-3;
         let record = &self.prepared.record;
+        // new weights first: with all that moves at once, the kinks at which plays turn stop the fit early
+        let still = FitOptions { steps: STILL, gain: 1e-3, ..self.options.clone() };
+        let point = fit(point, record, &still, "refinement", progress)?.point;
         let mut fitted = fit(point, record, &options, "refinement", progress)?;
         if fitted.point.drop_unused() {
             options.steps = STEPS / 3;
@@ -219,60 +221,14 @@ impl<'a> Search<'a> {
         if self.point.effects.iter().any(|effect| effect.name() == entry.name) {
             return Ok(());
         }
-        let Some((_, score, _)) = self.scored(&[entry], progress)?.into_iter().next() else {
+        let Some(best) = self.scored(&[entry], progress)?.into_iter().next() else {
             let requirement = "the record shows nothing to place it by; leave it out";
             return Err(Error::parameter("require", entry.name, requirement));
         };
-        let trial = self.trial(entry, score, progress)?;
+        let trial = self.trial(best, progress)?;
         (self.point, self.cost) = (trial.point.clone(), trial.cost);
         self.rounds.push(Round { trial, others: Vec::new(), dropped: Vec::new() });
         self.repair()
-    }
-
-    /// The best candidate of each family that promises something, the most promising first.
-    fn ranked(&self, progress: Progress) -> Result<Vec<(&'static Entry, Score)>, Error> {
-        let mut best = self.scored(&self.allowed, progress)?;
-        /// A family that promises less than this part of the best one's need not be fitted.
-        const FAR_BEHIND: f64 = 0.2;
-        let most = best.first().map_or(0.0, |first| first.2);
-        best.retain(|(_, _, worth)| *worth > 0.0 && *worth > FAR_BEHIND * most);
-        Ok(best.into_iter().map(|(entry, score, _)| (entry, score)).collect())
-    }
-
-    /// The best candidate of each family, and by how much its deviance exceeds what its parameters cost.
-    fn scored(
-        &self,
-        families: &[&'static Entry],
-        progress: Progress,
-    ) -> Result<Vec<(&'static Entry, Score, f64)>, Error> {
-        let base = self.base()?;
-        let values = self.prepared.values();
-        let present = |entry: &Entry| self.point.effects.iter().any(|e| e.name() == entry.name);
-        // G of any order takes a delay for itself
-        let of_use = |entry: &Entry| entry.name != "delay" || self.order_is_given;
-        let usable = |entry: &&&Entry| of_use(entry) && (entry.repeats || !present(entry));
-        let (mut entries, mut candidates) = (Vec::new(), Vec::new());
-        for &entry in families.iter().filter(usable) {
-            let found = base.situation(entry.candidates);
-            // before and behind the output stage is the same where there is none
-            let elsewhere = found.iter().filter_map(Candidate::elsewhere).filter(|_| self.senses());
-            candidates.extend(elsewhere.collect::<Vec<_>>());
-            candidates.extend(found);
-            entries.resize(candidates.len(), entry);
-        }
-        let mut check = |done| report(progress, "score test", done);
-        let mut best: Vec<(&'static Entry, Score, f64)> = Vec::new();
-        for (entry, score) in entries.into_iter().zip(scores(&base, &candidates, &mut check)?) {
-            let deviance = -values * (1.0 - score.gain).max(1e-300).ln();
-            let worth = deviance - score.columns as f64 * values.ln();
-            match best.iter_mut().find(|(known, _, _)| known.name == entry.name) {
-                Some(known) if known.2 < worth => *known = (entry, score, worth),
-                Some(_) => {}
-                None => best.push((entry, score, worth)),
-            }
-        }
-        best.sort_by(|a, b| b.2.total_cmp(&a.2));
-        Ok(best)
     }
 }
 

@@ -1,5 +1,6 @@
 //! One more effect, fitted jointly with the whole model and judged.
 
+use super::ranking::Ranked;
 use super::score::Score;
 use super::search::Search;
 use crate::effects::Entry;
@@ -45,22 +46,30 @@ impl Search<'_> {
     /// Fits the whole model with one more effect.
     pub(super) fn trial(
         &self,
-        entry: &'static Entry,
-        score: Score,
+        Ranked { entry, score, displaced, .. }: Ranked,
         progress: Progress,
     ) -> Result<Trial, Error> {
-        /// Where the start that the score test suggests is worse than the model without the effect by this
-        /// factor of the squares, it is beyond what is linear.
-        const BEYOND: f64 = 10.0;
-        let mut start = self.point.with_effect(score.start);
-        if let Some(zero) = score.zero
-            && self.squares(&start, &self.prepared.record)?.iter().sum::<f64>() > BEYOND * self.cost
-        {
-            start = self.point.with_effect(zero);
-        }
+        let moved = if displaced { self.point.displaced() } else { None };
+        let gain = score.gain;
+        let start = self.start(moved.as_ref().unwrap_or(&self.point), score)?;
         let record = &self.prepared.record;
         let fitted = fit(start, record, &self.options, entry.name, progress)?;
-        self.judged(entry, fitted, score.gain, progress)
+        self.judged(entry, fitted, gain, progress)
+    }
+
+    /// A point with one more effect: as the score test suggests it, or without effect yet where that is
+    /// beyond what is linear or sensible.
+    pub(super) fn start(&self, base: &Point, score: Score) -> Result<Point, Error> {
+        /// The start is worse than the model without the effect by this factor of the squares.
+        const BEYOND: f64 = 10.0;
+        let start = base.with_effect(score.start.clone());
+        let Some(zero) = score.zero else { return Ok(start) };
+        let block = score.start.block();
+        let mut limits = block.values().into_iter().zip(block.bounds());
+        let is_sensible = limits.all(|(value, (low, high))| low <= value && value <= high);
+        let squares = self.squares(&start, &self.prepared.record)?.iter().sum::<f64>();
+        let is_near = squares <= BEYOND * self.cost;
+        Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })
     }
 
     pub(super) fn judged(

@@ -3,7 +3,7 @@
 use super::point::{Past, Point};
 use super::sensitivity::{Beside, Parameters};
 use super::stream::hats;
-use crate::effects::{Effect, Moment, Slope, Stage};
+use crate::effects::{Block, Effect, Moment, Slope, Stage};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::{DVector, RowDVector};
@@ -59,28 +59,39 @@ impl Point {
         experiment: &Experiment,
         past: &Past,
     ) -> Result<Matrix, Error> {
-        let linear = self.dynamics.to_state_space()?;
-        let delayed = linear.order() - self.dynamics.order();
-        let mut state = linear.equilibrium(&v.row(0).transpose());
-        let mut displacement = linear.simulate_from(&mut state, v)?;
+        let Sections { delay, sections, d, .. } = &self.dynamics;
         let loops: Vec<_> = self.loops().collect();
-        if !past.moving && loops.is_empty() {
-            return Ok(displacement);
-        }
-        // What the start and the feedback add evolves by itself.
-        let mut free = DVector::zeros(linear.order());
+        let outputs = d.nrows();
+        let mut displacement = Matrix::zeros(v.nrows(), outputs);
+        // before the record the intermediate signals stood
+        let first = v.row(0).transpose();
+        let standing = sections.iter().map(|section| section.standing(&section.b) * &first);
+        let mut state: Vec<f64> =
+            standing.flat_map(|states| states.data.as_vec().clone()).collect();
+        let mut now = DVector::zeros(v.ncols());
         for k in 0..v.nrows() {
             if k == experiment.warmup && past.moving {
-                let mut own = free.rows_mut(delayed, past.state.len());
-                own += &past.state;
+                state.iter_mut().zip(past.state.iter()).for_each(|(state, own)| *state += own);
             }
-            let mut row = displacement.row_mut(k);
-            row += (linear.c() * &free).transpose();
-            free = linear.a() * free;
+            now.tr_copy_from(&v.row(k.saturating_sub(*delay)));
+            for output in 0..outputs {
+                displacement[(k, output)] = d.row(output).tr_dot(&now);
+            }
+            let mut rest = &mut state[..];
+            for section in sections {
+                let (own, others) = rest.split_at_mut(section.order());
+                for output in 0..outputs {
+                    let c = section.c.row(output);
+                    displacement[(k, output)] +=
+                        own.iter().zip(c.iter()).map(|(x, c)| x * c).sum::<f64>();
+                }
+                section.advance(own, now.as_slice());
+                rest = others;
+            }
             for effect in &loops {
                 let drives = effect.block().feedback(displacement[(k, effect.block().channel())]);
-                for (state, (drive, _)) in drives.into_iter().enumerate() {
-                    free[delayed + state] += drive;
+                for (state, (drive, _)) in state.iter_mut().zip(drives) {
+                    *state += drive;
                 }
             }
         }
@@ -107,17 +118,50 @@ impl Point {
     /// Adds what the input does not drive, to the displacement or to the reading.
     pub(crate) fn add(&self, stage: Stage, experiment: &Experiment, output: &mut Matrix) {
         for effect in self.at_stage(stage) {
-            let block = effect.block();
-            let rows = experiment.covariates.transpose();
-            let covariates = |k: usize| {
-                let width = rows.nrows();
-                &rows.as_slice()[k * width..(k + 1) * width]
-            };
-            let mut state = block.rest(0.0, self.moment(0, covariates(0)));
-            for (k, value) in output.column_mut(block.channel()).iter_mut().enumerate() {
-                *value += block.add(&mut state, self.moment(k, covariates(k)));
-            }
+            self.add_one(effect.block(), experiment, 1.0, output);
         }
+    }
+
+    /// Adds what one block does, so many times.
+    fn add_one(&self, block: &dyn Block, experiment: &Experiment, times: f64, output: &mut Matrix) {
+        let rows = experiment.covariates.transpose();
+        let covariates = |k: usize| {
+            let width = rows.nrows();
+            &rows.as_slice()[k * width..(k + 1) * width]
+        };
+        let mut state = block.rest(0.0, self.moment(0, covariates(0)));
+        for (k, value) in output.column_mut(block.channel()).iter_mut().enumerate() {
+            *value += times * block.add(&mut state, self.moment(k, covariates(k)));
+        }
+    }
+
+    /// Whether the model has an output stage.
+    pub(crate) fn senses(&self) -> bool {
+        self.at_stage(Stage::Output).next().is_some()
+    }
+
+    /// Whether what a block does is added to the reading as it is, whatever the rest of the model does.
+    fn is_apart(&self, block: &dyn Block) -> bool {
+        block.stage() == Stage::Added || (block.stage() == Stage::Displaced && !self.senses())
+    }
+
+    /// What the output gains by a block beside this point's own; `here` is the output.
+    pub(crate) fn gained_by(
+        &self,
+        effect: &Effect,
+        known: &Signals,
+        here: &Matrix,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Matrix, Error> {
+        let block = effect.block();
+        if self.is_apart(block) {
+            let mut gained = Matrix::zeros(here.nrows(), here.ncols());
+            self.add_one(block, experiment, 1.0, &mut gained);
+            return Ok(gained);
+        }
+        let point = self.with_effect(effect.clone());
+        Ok(point.output_from(block.stage(), known, experiment, index)? - here)
     }
 
     /// The signals along the chain.
@@ -208,6 +252,13 @@ impl Point {
             values[number] += step;
             let mut moved = self.clone();
             moved.effects[place].block_mut().set(&values);
+            if self.is_apart(block) {
+                let mut column = Matrix::zeros(here.nrows(), here.ncols());
+                let moved = moved.effects[place].block();
+                self.add_one(moved, experiment, 1.0 / step, &mut column);
+                self.add_one(block, experiment, -1.0 / step, &mut column);
+                return Ok(column);
+            }
             let there = moved.output_from(block.stage(), known, experiment, index)?;
             Ok((there - here) / step)
         };

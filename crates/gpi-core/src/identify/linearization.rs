@@ -82,33 +82,13 @@ impl Linearization {
         check: &mut dyn FnMut() -> Result<(), Error>,
     ) -> Result<Self, Error> {
         let layout = Layout::new(point, freedom);
-        let unknowns = layout.len;
-        std::thread::scope(|scope| {
-            // one thread makes rows while another one gathers them
-            let (send, receive) = sync_channel::<(Vec<Matrix>, Matrix)>(2);
-            let gathering = scope.spawn(move || {
-                let mut gathered = Gathered::new(unknowns);
-                receive.iter().for_each(|(rows, residuals)| {
-                    gathered.add(rows, &residuals, weighting);
-                });
-                gathered
-            });
-            for (index, experiment) in record.experiments().iter().enumerate() {
-                check()?;
-                let mut stream =
-                    Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
-                stream.run(&mut |rows| {
-                    check()?;
-                    // only a panic ends the other thread early, and joining it tells
-                    let _ = send.send((rows.regressors.to_vec(), rows.residuals.clone()));
-                    Ok(())
-                })?;
-            }
-            drop(send);
-            let Gathered { equations, cost } =
-                gathering.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            Ok(Self { equations, layout: layout.clone(), cost })
-        })
+        let mut gathered = Gathered::new(layout.len);
+        for (index, experiment) in record.experiments().iter().enumerate() {
+            check()?;
+            let stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
+            gather(stream, check, |rows, residuals| gathered.add(rows, &residuals, weighting))?;
+        }
+        Ok(Self { equations: gathered.equations, cost: gathered.cost, layout })
     }
 
     /// Half the steepest descent of the cost.
@@ -120,6 +100,30 @@ impl Linearization {
     pub(crate) fn predicted(&self, step: &DVector<f64>) -> f64 {
         2.0 * step.dot(&self.descent()) - (&self.equations.gram * step).dot(step)
     }
+}
+
+/// Streams an experiment on this thread and gathers its blocks of rows on another one: regressors
+/// (unknowns, samples) of every output, and residuals (outputs, samples).
+pub(crate) fn gather(
+    mut stream: Stream,
+    check: &mut dyn FnMut() -> Result<(), Error>,
+    mut add: impl FnMut(Vec<Matrix>, Matrix) + Send,
+) -> Result<(), Error> {
+    std::thread::scope(|scope| {
+        let (send, receive) = sync_channel::<(Vec<Matrix>, Matrix)>(2);
+        let gathering = scope.spawn(move || {
+            receive.iter().for_each(|(rows, residuals)| add(rows, residuals));
+        });
+        let streamed = stream.run(&mut |rows| {
+            check()?;
+            // only a panic ends the other thread early, and joining it tells
+            let _ = send.send((rows.regressors.to_vec(), rows.residuals.clone()));
+            Ok(())
+        });
+        drop(send);
+        gathering.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        streamed
+    })
 }
 
 /// Rows gathered so far.

@@ -79,9 +79,17 @@ impl Parameters {
     pub(crate) fn apply(&self, start: Option<&[f64]>, beside: Beside, signal: &mut [f64]) {
         let mut k = 0;
         let u = signal.to_vec();
+        // most plays stick, and read the same then
+        let mut known = vec![(f64::NAN, 0.0); self.half_widths.len()];
         self.run(start, beside, &u, &mut |plays, beside| {
-            let plays = plays.iter().zip(&self.half_widths).zip(&self.weights);
-            signal[k] = plays.map(|((&place, &r), weight)| weight * beside.read(r, place).0).sum();
+            let mut v = 0.0;
+            for (i, (&place, known)) in plays.iter().zip(&mut known).enumerate() {
+                if place != known.0 {
+                    *known = (place, beside.read(self.half_widths[i], place).0);
+                }
+                v += self.weights[i] * known.1;
+            }
+            signal[k] = v;
             k += 1;
         });
     }
@@ -209,6 +217,8 @@ pub(crate) struct Sensitivity<'a> {
     /// u(k-1), which directional deadzones compare with.
     previous: Option<f64>,
     plays: Vec<f64>,
+    /// What each place is read as, and the derivative; not a number before the first sample.
+    reads: Vec<(f64, f64)>,
     /// Whether play i still remembers its start value.
     remembers: Vec<bool>,
     /// dF_i/dr_i.
@@ -240,6 +250,7 @@ impl<'a> Sensitivity<'a> {
             previous: None,
             start,
             plays: vec![0.0; n],
+            reads: vec![(f64::NAN, 0.0); n],
             remembers: vec![start.is_some(); n],
             directions: vec![0.0; n],
             held: vec![0.0; n * zones],
@@ -303,7 +314,10 @@ impl<'a> Sensitivity<'a> {
                 }
             }
             self.plays[i] = value;
-            let (read, slope) = self.beside.read(half_widths[i], value);
+            if value != previous || self.reads[i].0.is_nan() {
+                self.reads[i] = self.beside.read(half_widths[i], value);
+            }
+            let (read, slope) = self.reads[i];
             v += weights[i] * read;
             output[1 + i] = read;
             if self.wanted.half_widths {
@@ -323,11 +337,11 @@ impl<'a> Sensitivity<'a> {
 
     /// The sums anew, with the slopes of the curves at the plays' present places.
     fn sum_through_curves(&mut self) {
-        let Parameters { half_widths, weights, .. } = self.parameters;
+        let weights = &self.parameters.weights;
         self.sums.fill(0.0);
         let held = self.held.chunks_exact(self.present.len());
         for (i, held) in held.enumerate().filter(|(i, _)| weights[*i] != 0.0) {
-            let slope = weights[i] * self.beside.read(half_widths[i], self.plays[i]).1;
+            let slope = weights[i] * self.reads[i].1;
             self.sums.iter_mut().zip(held).for_each(|(sum, value)| *sum += slope * value);
         }
     }

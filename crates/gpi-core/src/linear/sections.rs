@@ -64,6 +64,17 @@ impl Section {
         states
     }
 
+    /// Moves the state on by one sample of what drives the inputs.
+    pub(crate) fn advance(&self, state: &mut [f64], drive: &[f64]) {
+        let driven = |j| drive.iter().enumerate().map(|(i, v)| self.b[(j, i)] * v).sum::<f64>();
+        match (&self.a[..], state) {
+            ([a1, a2], [x1, x2]) => {
+                (*x1, *x2) = (*x2 - a1 * *x1 + driven(0), driven(1) - a2 * *x1);
+            }
+            (a, state) => state[0] = driven(0) - a[0] * state[0],
+        }
+    }
+
     /// Whether all poles lie inside a circle slightly smaller than the unit circle.
     pub(crate) fn is_stable(&self) -> bool {
         /// Poles beyond have a memory of more than 10^7 samples.

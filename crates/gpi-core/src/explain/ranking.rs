@@ -1,0 +1,98 @@
+//! Which effects the score test finds most promising.
+
+use super::score::{Base, Score, scores};
+use super::search::Search;
+use crate::Error;
+use crate::effects::{Candidate, Entry, Stage};
+use crate::identify::point::Point;
+use crate::identify::{Progress, report};
+
+/// The best candidate of a family.
+pub(super) struct Ranked {
+    pub entry: &'static Entry,
+    pub score: Score,
+    /// By how much its deviance exceeds what its parameters cost.
+    pub worth: f64,
+    /// Whether the score is that beside a point with all that is added in front of the sensor.
+    pub displaced: bool,
+}
+
+impl Search<'_> {
+    /// The best candidate of each family that promises something, the most promising first.
+    pub(super) fn ranked(&self, progress: Progress) -> Result<Vec<Ranked>, Error> {
+        /// A family that promises less than this part of the best one's need not be fitted.
+        const FAR_BEHIND: f64 = 0.2;
+        let mut best = self.scored(&self.allowed, progress)?;
+        let most = best.first().map_or(0.0, |first| first.worth);
+        best.retain(|one| one.worth > 0.0 && one.worth > FAR_BEHIND * most);
+        Ok(best)
+    }
+
+    /// The best candidate of each family, the most promising first.
+    pub(super) fn scored(
+        &self,
+        families: &[&'static Entry],
+        progress: Progress,
+    ) -> Result<Vec<Ranked>, Error> {
+        let mut best = self.scored_beside(&self.point, families, progress)?;
+        // what is added to the reading may as well be in front of a sensor that is not known yet
+        if !self.point.senses()
+            && let Some(moved) = self.point.displaced()
+        {
+            let sensors: Vec<&'static Entry> =
+                families.iter().copied().filter(|entry| entry.stage == Stage::Output).collect();
+            for one in self.scored_beside(&moved, &sensors, progress)? {
+                keep_best(&mut best, Ranked { displaced: true, ..one });
+            }
+            sort(&mut best);
+        }
+        Ok(best)
+    }
+
+    /// The same beside another point, where it is.
+    pub(super) fn scored_beside(
+        &self,
+        point: &Point,
+        families: &[&'static Entry],
+        progress: Progress,
+    ) -> Result<Vec<Ranked>, Error> {
+        let Self { prepared, options, .. } = self;
+        let base = Base::new(point, &prepared.record, options.freedom, &options.weighting)?;
+        let values = prepared.values();
+        let present = |entry: &Entry| point.effects.iter().any(|e| e.name() == entry.name);
+        // G of any order takes a delay for itself
+        let of_use = |entry: &Entry| entry.name != "delay" || self.order_is_given;
+        let usable = |entry: &&&Entry| of_use(entry) && (entry.repeats || !present(entry));
+        let (mut entries, mut candidates) = (Vec::new(), Vec::new());
+        for &entry in families.iter().filter(usable) {
+            let found = base.situation(entry.candidates);
+            // before and behind the output stage is the same where there is none
+            let elsewhere =
+                found.iter().filter_map(Candidate::elsewhere).filter(|_| point.senses());
+            candidates.extend(elsewhere.collect::<Vec<_>>());
+            candidates.extend(found);
+            entries.resize(candidates.len(), entry);
+        }
+        let mut check = |done| report(progress, "score test", done);
+        let mut best = Vec::new();
+        for (entry, score) in entries.into_iter().zip(scores(&base, &candidates, &mut check)?) {
+            let deviance = -values * (1.0 - score.gain).max(1e-300).ln();
+            let worth = deviance - score.columns as f64 * values.ln();
+            keep_best(&mut best, Ranked { entry, score, worth, displaced: false });
+        }
+        sort(&mut best);
+        Ok(best)
+    }
+}
+
+fn keep_best(best: &mut Vec<Ranked>, one: Ranked) {
+    match best.iter_mut().find(|known| known.entry.name == one.entry.name) {
+        Some(known) if known.worth < one.worth => *known = one,
+        Some(_) => {}
+        None => best.push(one),
+    }
+}
+
+fn sort(best: &mut [Ranked]) {
+    best.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+}
