@@ -117,3 +117,22 @@ impl Block for Creep {
         (a1(LONGEST), a1(SHORTEST))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn creep_goes_on_in_one_direction_and_shows_within_the_record() {
+        let creep = |times: &[f64], gains: &[f64]| Creep {
+            input: 0,
+            time_constants: times.to_vec(),
+            gains: gains.to_vec(),
+            dead_time: 0,
+        };
+        assert!(creep(&[0.2, 3.0], &[0.03, 0.01]).is_plausible(20.0));
+        assert!(creep(&[0.2], &[-0.03]).is_plausible(20.0));
+        assert!(!creep(&[0.2, 3.0], &[0.03, -0.01]).is_plausible(20.0));
+        assert!(!creep(&[0.2, 375.0], &[0.03, 0.01]).is_plausible(20.0));
+    }
+}

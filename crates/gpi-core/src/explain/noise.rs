@@ -120,3 +120,18 @@ fn one_step(residuals: &[Matrix], record: &Record, output: usize, filter: &[f64]
     let deviation = |sum: f64| (sum / f64::max(count, 1.0)).sqrt();
     (deviation(own), deviation(left))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_shortly_after_an_input_jumps_are_known() {
+        let input = Matrix::from_fn(1000, 1, |k, _| if k < 400 { 0.0 } else { 5.0 });
+        let after = after_jumps(&input);
+        let places: Vec<usize> = (0..1000).filter(|&k| after[k]).collect();
+        assert_eq!(places, (400..408).collect::<Vec<_>>());
+        // nothing moves: nothing jumps
+        assert!(!after_jumps(&Matrix::zeros(50, 2)).contains(&true));
+    }
+}

@@ -85,17 +85,15 @@ impl<'a> Search<'a> {
     pub(crate) fn run(&mut self, progress: Progress) -> Result<(), Error> {
         const ROUNDS: usize = 12;
         for _ in 0..ROUNDS {
-            let known = self.rounds.len();
-            self.round(progress)?;
-            if self.rounds.len() == known && !self.shed_lags(progress)? {
+            if !self.round(progress)? && !self.shed_lags(progress)? {
                 break;
             }
         }
         self.prefer_driven(progress)
     }
 
-    /// One round: takes the best effect, if any is confirmed.
-    fn round(&mut self, progress: Progress) -> Result<(), Error> {
+    /// One round: takes the best effect, if any is confirmed; says whether the model became another.
+    fn round(&mut self, progress: Progress) -> Result<bool, Error> {
         /// Families that are fitted; the score test's best are rarely wrong.
         const FITTED: usize = 4;
         /// Part of the residual's squares.
@@ -117,7 +115,7 @@ impl<'a> Search<'a> {
         }
         if ranked.iter().all(|one| one.score.gain < HOPELESS) {
             self.last.clear();
-            return Ok(());
+            return Ok(false);
         }
         let before = self.held_out(&self.point)?;
         ranked.truncate(FITTED);
@@ -135,9 +133,12 @@ impl<'a> Search<'a> {
         });
         let Some(taken) = taken else {
             self.last = trials.iter().map(|trial| self.reject(trial, None, &before)).collect();
-            return Ok(());
+            return Ok(false);
         };
         let taken = trials.remove(taken);
+        if !SIGNED.contains(&taken.entry.name) && self.was_in_the_way(&taken, progress)? {
+            return Ok(true);
+        }
         let others = trials.iter().map(|trial| self.reject(trial, Some(&taken), &before)).collect();
         self.point = taken.point.clone();
         self.cost = taken.cost;
@@ -150,7 +151,7 @@ impl<'a> Search<'a> {
         self.is_rich = false;
         self.rearrange(progress)?;
         self.backward(progress)?;
-        Ok(())
+        Ok(true)
     }
 
     /// Moves half-widths and thresholds, and takes finer grids as long as they pay: what the declared model
