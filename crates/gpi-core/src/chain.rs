@@ -1,6 +1,7 @@
 //! A model's chain with its effects, a block of samples at a time.
 
 use crate::effects::{Block, Effect, Moment, Quantity, Stage, Units};
+use crate::linear::advance;
 use crate::model::{Model, ModelState};
 use crate::operators::{GpiState, Operator, play};
 use crate::{Channel, Error, Matrix};
@@ -293,14 +294,7 @@ fn beside(block: &dyn Block, memory: &mut [f64], v: f64, rate: f64) -> f64 {
     for (a, b) in block.sections(rate) {
         let own = &mut states[first..first + a.len()];
         sum += own[0];
-        match a[..] {
-            [a1, a2] => {
-                let x1 = own[0];
-                own[0] = own[1] - a1 * x1 + b[0] * delayed;
-                own[1] = b[1] * delayed - a2 * x1;
-            }
-            _ => own[0] = b[0] * delayed - a[0] * own[0],
-        }
+        advance(&a, own, |state| b[state] * delayed);
         first += a.len();
     }
     sum

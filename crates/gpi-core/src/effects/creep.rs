@@ -78,8 +78,8 @@ impl Block for Creep {
 
     /// Creep goes on in one direction, and what is slower than the record is a trend.
     fn is_plausible(&self, duration: f64) -> bool {
-        let mut gains = self.gains.iter().zip(&self.gains[1..]);
-        gains.all(|(a, b)| a * b >= 0.0) && self.time_constants.iter().all(|&time| time < duration)
+        self.gains.windows(2).all(|pair| pair[0] * pair[1] >= 0.0)
+            && self.time_constants.iter().all(|&time| time < duration)
     }
 
     fn quantities(&self, _: Units) -> Vec<Quantity> {

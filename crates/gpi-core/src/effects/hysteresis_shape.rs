@@ -4,8 +4,8 @@ use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
 /// Plays read through curves: `v = sum_i p_i (F_i + s q(f_i, r_i))` with `f_i = (F_i - m) / s` and
 /// `dq/df = sum_a sum_b c_ab P_a(f) P_b(2 r / R - 1)`, a = 1 .. A, b = 0 .. B - 1, P Legendre's
-/// polynomials, q = 0 at both ends of the plays' range and beyond; r beyond R counts as R. The play of half-width 0 is read as it
-/// is: its curve is the envelope's.
+/// polynomials, q = 0 at both ends of the plays' range and beyond; r beyond R counts as R. The play of
+/// half-width 0 is read as it is: its curve is the envelope's.
 ///
 /// Sums of curves of plays are the Preisach operators (1 + dq/df is their density over the half-plane of
 /// thresholds), whose minor loops change with their place. The declared hysteresis is q = 0.

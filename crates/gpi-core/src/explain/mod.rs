@@ -6,7 +6,8 @@
 //!    projected off the model's own sensitivities, takes a part of the residual.
 //! 3. The best few are fitted jointly with the whole model. The one that explains most stays if it gains
 //!    more than chance, and if the held-out blocks confirm it; effects that it makes superfluous go.
-//! 4. Back to 2 until nothing is confirmed; then the residual is tested for what is left.
+//! 4. Back to 2 until nothing is confirmed; then what the input drives takes the place of a slow function
+//!    of time that it explains as well, and the residual is tested for what is left.
 
 mod blocks;
 mod concurrently;

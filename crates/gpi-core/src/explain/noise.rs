@@ -50,7 +50,7 @@ fn outliers(search: &Search) -> Option<Effect> {
     (count >= FEWEST && 2 * driven < count).then(|| Outliers { count, samples, size }.into())
 }
 
-/// Whether an input jumped shortly before: by more than nearly all of its changes.
+/// Whether an input jumped at a sample or up to seven before: by more than 99 % of its changes.
 fn after_jumps(input: &Matrix) -> Vec<bool> {
     const SHORTLY: usize = 8;
     const NEARLY_ALL: f64 = 0.99;

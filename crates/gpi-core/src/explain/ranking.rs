@@ -3,7 +3,7 @@
 use super::score::{Base, Score, scores};
 use super::search::Search;
 use crate::Error;
-use crate::effects::{Candidate, Entry, Stage};
+use crate::effects::{Candidate, Entry};
 use crate::identify::point::Point;
 use crate::identify::{Progress, report};
 
@@ -13,8 +13,6 @@ pub(super) struct Ranked {
     pub score: Score,
     /// By how much its deviance exceeds what its parameters cost.
     pub worth: f64,
-    /// Whether the score is that beside a point with all that is added in front of the sensor.
-    pub displaced: bool,
 }
 
 impl Search<'_> {
@@ -22,34 +20,13 @@ impl Search<'_> {
     pub(super) fn ranked(&self, progress: Progress) -> Result<Vec<Ranked>, Error> {
         /// A family that promises less than this part of the best one's need not be fitted.
         const FAR_BEHIND: f64 = 0.2;
-        let mut best = self.scored(&self.allowed, progress)?;
+        let mut best = self.scored_beside(&self.point, &self.allowed, progress)?;
         let most = best.first().map_or(0.0, |first| first.worth);
         best.retain(|one| one.worth > 0.0 && one.worth > FAR_BEHIND * most);
         Ok(best)
     }
 
-    /// The best candidate of each family, the most promising first.
-    pub(super) fn scored(
-        &self,
-        families: &[&'static Entry],
-        progress: Progress,
-    ) -> Result<Vec<Ranked>, Error> {
-        let mut best = self.scored_beside(&self.point, families, progress)?;
-        // what is added to the reading may as well be in front of a sensor that is not known yet
-        if !self.point.senses()
-            && let Some(moved) = self.point.displaced()
-        {
-            let sensors: Vec<&'static Entry> =
-                families.iter().copied().filter(|entry| entry.stage == Stage::Output).collect();
-            for one in self.scored_beside(&moved, &sensors, progress)? {
-                keep_best(&mut best, Ranked { displaced: true, ..one });
-            }
-            sort(&mut best);
-        }
-        Ok(best)
-    }
-
-    /// The same beside another point, where it is.
+    /// The best candidate of each family beside a point, the most promising first.
     pub(super) fn scored_beside(
         &self,
         point: &Point,
@@ -78,9 +55,9 @@ impl Search<'_> {
         for (entry, score) in entries.into_iter().zip(scores(&base, &candidates, &mut check)?) {
             let deviance = -values * (1.0 - score.gain).max(1e-300).ln();
             let worth = deviance - score.columns as f64 * values.ln();
-            keep_best(&mut best, Ranked { entry, score, worth, displaced: false });
+            keep_best(&mut best, Ranked { entry, score, worth });
         }
-        sort(&mut best);
+        best.sort_by(|a: &Ranked, b| b.worth.total_cmp(&a.worth));
         Ok(best)
     }
 }
@@ -91,8 +68,4 @@ fn keep_best(best: &mut Vec<Ranked>, one: Ranked) {
         Some(_) => {}
         None => best.push(one),
     }
-}
-
-fn sort(best: &mut [Ranked]) {
-    best.sort_by(|a, b| b.worth.total_cmp(&a.worth));
 }

@@ -29,33 +29,6 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether a trial gained because the model had not settled, and not by its effect: a fit that goes on
-    /// without the effect comes as far. It is the better model then.
-    pub(super) fn was_in_the_way(
-        &mut self,
-        trial: &Trial,
-        progress: Progress,
-    ) -> Result<bool, Error> {
-        /// Times what the score test promised: an effect by itself does not gain more.
-        const SUSPECT: f64 = 1.5;
-        let values = self.prepared.values();
-        let promised = -values * (1.0 - trial.promised).max(1e-300).ln();
-        let own = trial.point.effects.iter().rposition(|e| e.name() == trial.entry.name);
-        let Some(own) = own.filter(|_| trial.deviance > SUSPECT * promised) else {
-            return Ok(false);
-        };
-        let without = trial.point.without_effect(own);
-        let record = &self.prepared.record;
-        let fitted = fit(without, record, &self.options, "backward step", progress)?;
-        let cost = fitted.linearization.cost;
-        if values * (cost / trial.cost).ln() > trial.chance || cost >= self.cost {
-            return Ok(false);
-        }
-        (self.point, self.cost) = (fitted.point, cost);
-        self.is_rich = false;
-        Ok(true)
-    }
-
     /// Drops effects that a later one has made superfluous.
     pub(super) fn backward(&mut self, progress: Progress) -> Result<(), Error> {
         let mut place = 0;

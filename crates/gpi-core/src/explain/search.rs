@@ -136,9 +136,6 @@ impl<'a> Search<'a> {
             return Ok(false);
         };
         let taken = trials.remove(taken);
-        if !SIGNED.contains(&taken.entry.name) && self.was_in_the_way(&taken, progress)? {
-            return Ok(true);
-        }
         let others = trials.iter().map(|trial| self.reject(trial, Some(&taken), &before)).collect();
         self.point = taken.point.clone();
         self.cost = taken.cost;
@@ -222,7 +219,8 @@ impl<'a> Search<'a> {
         if self.point.effects.iter().any(|effect| effect.name() == entry.name) {
             return Ok(());
         }
-        let Some(best) = self.scored(&[entry], progress)?.into_iter().next() else {
+        let Some(best) = self.scored_beside(&self.point, &[entry], progress)?.into_iter().next()
+        else {
             let requirement = "the record shows nothing to place it by; leave it out";
             return Err(Error::parameter("require", entry.name, requirement));
         };

@@ -46,12 +46,11 @@ impl Search<'_> {
     /// Fits the whole model with one more effect.
     pub(super) fn trial(
         &self,
-        Ranked { entry, score, displaced, .. }: Ranked,
+        Ranked { entry, score, .. }: Ranked,
         progress: Progress,
     ) -> Result<Trial, Error> {
-        let moved = if displaced { self.point.displaced() } else { None };
         let gain = score.gain;
-        let start = self.start(moved.as_ref().unwrap_or(&self.point), score)?;
+        let start = self.start(&self.point, score)?;
         let record = &self.prepared.record;
         let fitted = fit(start, record, &self.options, entry.name, progress)?;
         self.judged(entry, fitted, gain, progress)
@@ -60,15 +59,17 @@ impl Search<'_> {
     /// A point with one more effect: as the score test suggests it, or without effect yet where that is
     /// beyond what is linear or sensible.
     pub(super) fn start(&self, base: &Point, score: Score) -> Result<Point, Error> {
-        /// The start is worse than the model without the effect by this factor of the squares.
+        /// The start is worse than `base` by this factor of the squares.
         const BEYOND: f64 = 10.0;
         let start = base.with_effect(score.start.clone());
         let Some(zero) = score.zero else { return Ok(start) };
         let block = score.start.block();
         let mut limits = block.values().into_iter().zip(block.bounds());
         let is_sensible = limits.all(|(value, (low, high))| low <= value && value <= high);
-        let squares = self.squares(&start, &self.prepared.record)?.iter().sum::<f64>();
-        let is_near = squares <= BEYOND * self.cost;
+        let squares = |point: &Point| -> Result<f64, Error> {
+            Ok(self.squares(point, &self.prepared.record)?.iter().sum())
+        };
+        let is_near = squares(&start)? <= BEYOND * squares(base)?;
         Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })
     }
 

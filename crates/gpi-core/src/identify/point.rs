@@ -359,24 +359,6 @@ impl Point {
         point
     }
 
-    /// The same with all that is added to the reading in front of the sensor; `None` where nothing is.
-    pub(crate) fn displaced(&self) -> Option<Self> {
-        let mut moved: Option<Self> = None;
-        loop {
-            let point = moved.as_ref().unwrap_or(self);
-            let mut added = point.effects.iter().enumerate();
-            let elsewhere = |(place, effect): (usize, &Effect)| {
-                let block = effect.block();
-                let other = (block.stage() == Stage::Added).then(|| block.elsewhere()).flatten()?;
-                Some(point.without_effect(place).with_effect(other))
-            };
-            match added.find_map(elsewhere) {
-                Some(next) => moved = Some(next),
-                None => return moved,
-            }
-        }
-    }
-
     /// The effects, with the values that stand in the dynamics.
     pub(crate) fn blocks(&self) -> Vec<Effect> {
         let mut effects = self.effects.clone();

@@ -21,4 +21,4 @@ pub use zero_order_hold::zero_order_hold;
 pub(crate) use era::Hankel;
 pub(crate) use fir::excitation_limit;
 pub(crate) use least_squares::{NormalEquations, bounded};
-pub(crate) use sections::{Section, Sections};
+pub(crate) use sections::{Section, Sections, advance};

@@ -36,6 +36,16 @@ pub(crate) struct Sections {
     pub held: Vec<(usize, f64)>,
 }
 
+/// Moves the state of a section in observer form on by one sample, with what drives each of its states.
+pub(crate) fn advance(a: &[f64], state: &mut [f64], driven: impl Fn(usize) -> f64) {
+    match (a, state) {
+        ([a1, a2], [x1, x2]) => {
+            (*x1, *x2) = (*x2 - a1 * *x1 + driven(0), driven(1) - a2 * *x1);
+        }
+        (a, state) => state[0] = driven(0) - a[0] * state[0],
+    }
+}
+
 impl Section {
     pub(crate) fn order(&self) -> usize {
         self.a.len()
@@ -66,13 +76,8 @@ impl Section {
 
     /// Moves the state on by one sample of what drives the inputs.
     pub(crate) fn advance(&self, state: &mut [f64], drive: &[f64]) {
-        let driven = |j| drive.iter().enumerate().map(|(i, v)| self.b[(j, i)] * v).sum::<f64>();
-        match (&self.a[..], state) {
-            ([a1, a2], [x1, x2]) => {
-                (*x1, *x2) = (*x2 - a1 * *x1 + driven(0), driven(1) - a2 * *x1);
-            }
-            (a, state) => state[0] = driven(0) - a[0] * state[0],
-        }
+        let driven = |j| drive.iter().enumerate().map(|(i, v)| self.b[(j, i)] * v).sum();
+        advance(&self.a, state, driven);
     }
 
     /// Whether all poles lie inside a circle slightly smaller than the unit circle.
