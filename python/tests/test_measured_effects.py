@@ -105,3 +105,13 @@ def test_an_injected_effect_is_named(
     assert name in answers(found) - answers(plain)
     # most of what was put in is gone
     assert found.after["holdout"]["rms"] < 2 * plain.before["holdout"]["rms"]
+
+
+def test_one_sine_is_not_asked_for_what_it_cannot_tell() -> None:
+    record = gpi.read_record(MEASURED / "piezo-p885-dbo" / "model_1hz_fullscale.csv", covariate=[])
+    found = gpi.explain(record)
+    assert "creep" in found.effects or "drift" in found.effects
+    assert not {"linear-dynamics", "hysteresis-shape", "output-nonlinearity"} & set(found.effects)
+    lines = [step for step in found.steps if step["effect"] == "periodic-disturbance"]
+    for row in (row for step in lines for row in step["parameters"] if row["name"] == "frequency"):
+        assert abs(row["value"] - round(row["value"])) > 0.1, "a harmonic of the drive at 1 Hz"

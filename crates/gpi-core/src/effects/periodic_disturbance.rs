@@ -1,8 +1,7 @@
 //! A line that the input does not drive.
 
+use super::spectrum::{Strongest, near, peak, power};
 use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
-use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 /// `y += a cos(2 pi f t) + b sin(2 pi f t)`: mains hum, a pump, a vibration.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -59,18 +58,12 @@ fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
     /// Slower lines are drift.
     const FEWEST_PERIODS: usize = 20;
     const AROUND: usize = 50;
-    let longest = situation.residuals.iter().max_by_key(|residual| residual.nrows())?;
-    let n = longest.nrows();
-    let column = longest.column(output);
-    let mean = column.mean();
-    let window = |k: usize| (std::f64::consts::PI * (k as f64 + 0.5) / n as f64).sin().powi(2);
-    let mut spectrum: Vec<Complex64> = column
-        .iter()
-        .enumerate()
-        .map(|(k, value)| Complex64::new((value - mean) * window(k), 0.0))
-        .collect();
-    FftPlanner::new().plan_fft_forward(n).process(&mut spectrum);
-    let power: Vec<f64> = spectrum[..n / 2].iter().map(Complex64::norm_sqr).collect();
+    let place = (0..situation.residuals.len()).max_by_key(|&i| situation.residuals[i].nrows())?;
+    let residual = &situation.residuals[place];
+    let n = residual.nrows();
+    let power = power(residual.column(output).as_slice());
+    let driven = driven(situation, place, output);
+    let is_driven = |line: usize| driven.as_ref().is_some_and(|most| most[line] > power[line]);
     let mut best: Option<(f64, usize)> = None;
     let mut first = FEWEST_PERIODS;
     // The median of a piece stands for its background.
@@ -79,7 +72,7 @@ fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
         let mut piece = power[first..last].to_vec();
         piece.sort_by(f64::total_cmp);
         let background = piece[piece.len() / 2].max(f64::MIN_POSITIVE);
-        for line in first..last {
+        for line in (first..last).filter(|&line| !is_driven(line)) {
             let ratio = power[line] / background;
             if best.is_none_or(|(most, _)| ratio > most) {
                 best = Some((ratio, line));
@@ -88,15 +81,29 @@ fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
         first += AROUND;
     }
     let (_, line) = best?;
-    // Hann's main lobe: the ratio of two neighbouring lines tells where the peak is
-    let size = |place: usize| power.get(place).map_or(0.0, |value| value.sqrt());
-    let (below, here, above) = (size(line - 1), size(line), size(line + 1));
-    let shift = if above > below {
-        (2.0 * above - here) / (above + here).max(f64::MIN_POSITIVE)
-    } else {
-        -(2.0 * below - here) / (below + here).max(f64::MIN_POSITIVE)
+    Some(peak(&power, line) * situation.record.rate() / n as f64)
+}
+
+/// Where the input is little but one line (a sine, a triangle): the power that a misfit of what it drives
+/// may have at each line. A line that is no stronger says nothing of a disturbance.
+fn driven(situation: &Situation, experiment: usize, output: usize) -> Option<Vec<f64>> {
+    /// The n-th harmonic of a misfit is at most this over n of the displacement's fundamental.
+    const MISFIT: f64 = 0.1;
+    /// Part of the input's power.
+    const MOST: f64 = 0.5;
+    let [drive] = situation.drives[experiment].column_iter().collect::<Vec<_>>()[..] else {
+        return None;
     };
-    Some((line as f64 + shift.clamp(-1.0, 1.0)) * situation.record.rate() / n as f64)
+    let strongest = Strongest::of(&power(drive.as_slice())).filter(|line| line.part > MOST)?;
+    let displacement = power(situation.displacements[experiment].column(output).as_slice());
+    let count = displacement.len();
+    let largest = displacement[near(strongest.place, count)].iter().copied().fold(0.0, f64::max);
+    let mut most = vec![0.0; count];
+    for n in 1..=(count as f64 / strongest.place) as usize {
+        let harmonic = near(n as f64 * strongest.place, count);
+        most[harmonic].fill(largest * (MISFIT / n as f64).powi(2));
+    }
+    Some(most)
 }
 
 impl Block for PeriodicDisturbance {

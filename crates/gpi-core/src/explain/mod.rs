@@ -23,6 +23,7 @@ mod search;
 mod trial;
 mod verdict;
 
+use crate::effects::is_one_sine;
 use crate::identify::chain::{compare, prepare};
 use crate::identify::levenberg_marquardt::fit;
 use crate::identify::preparation::starts_at_rest;
@@ -116,13 +117,18 @@ fn is_interrupted(result: Result<(), Error>) -> Result<bool, Error> {
 
 /// Grids that are rich enough for a base model and cheap enough for a search.
 fn usual_grids(options: &IdentifyOptions, training: &Record) -> IdentifyOptions {
+    let robust = Some(false);
+    if is_one_sine(training) {
+        // One cycle cannot tell many plays apart: as few as it asks for.
+        return IdentifyOptions { robust, ..options.clone() };
+    }
     // Where the past is unknown, many plays are needed to find it.
     let in_motion = |e: &crate::Experiment| e.warmup == 0 && !starts_at_rest(e);
     let plays = if training.experiments().iter().any(in_motion) { 24 } else { 16 };
     IdentifyOptions {
         half_widths: Some(options.half_widths.clone().unwrap_or(Grid::Count(plays))),
         thresholds: Some(options.thresholds.clone().unwrap_or(Grid::Count(7))),
-        robust: Some(false),
+        robust,
         ..options.clone()
     }
 }

@@ -2,6 +2,7 @@
 
 use super::residual::{ResidualTest, STRUCTURE};
 use super::search::Search;
+use super::trial::LEAST;
 use crate::effects::{ColouredNoise, Effect, Outliers};
 use crate::identify::colour::Colour;
 use crate::identify::{NoiseFloor, NoiseMethod};
@@ -15,7 +16,7 @@ pub(crate) fn effects(
     floor: &NoiseFloor,
 ) -> Result<Vec<Effect>, Error> {
     let mut found = Vec::new();
-    found.extend(outliers(search));
+    found.extend(outliers(search, residuals));
     for output in 0..search.measured.outputs().len() {
         let fails = |test: &ResidualTest| {
             test.output == output && STRUCTURE.contains(&test.name) && !test.passed()
@@ -28,7 +29,7 @@ pub(crate) fn effects(
 }
 
 /// The samples that were found wrong, by what they were changed.
-fn outliers(search: &Search) -> Option<Effect> {
+fn outliers(search: &Search, residuals: &[Matrix]) -> Option<Effect> {
     /// Fewer may be chance, or the way a record was cut.
     const FEWEST: usize = 3;
     let (mut count, mut driven, mut squares) = (0, 0, 0.0);
@@ -46,8 +47,10 @@ fn outliers(search: &Search) -> Option<Effect> {
     }
     let samples = measured.samples();
     let size = (squares / count.max(1) as f64).sqrt();
+    let left: f64 = residuals.iter().map(Matrix::norm_squared).sum();
     // samples that stand apart where the input jumps are what the model makes of a jump
-    (count >= FEWEST && 2 * driven < count).then(|| Outliers { count, samples, size }.into())
+    let stand_apart = count >= FEWEST && 2 * driven < count && squares > LEAST * (left + squares);
+    stand_apart.then(|| Outliers { count, samples, size }.into())
 }
 
 /// Whether an input jumped at a sample or up to seven before: by more than 99 % of its changes.
@@ -83,7 +86,10 @@ fn memory(
     /// Where the input never rests, a residual of so large a part of the span is no sensor's noise.
     const LOUD: f64 = 0.02;
     /// The part by which the standard deviation must fall.
-    const LEAST: f64 = 0.1;
+    const FALL: f64 = 0.1;
+    /// Fourth moment over the square of the second: 3 for noise of any colour, more for what comes in bursts
+    /// as the actuator moves.
+    const BURSTS: f64 = 3.8;
     let colour = Colour::of(residuals, &search.prepared.record);
     let filter = &colour.coefficients[output];
     if filter.is_empty() {
@@ -97,10 +103,10 @@ fn memory(
         NoiseMethod::HighFrequencyResidual => LOUD * span,
         _ => LOUDER * floor.rms[output],
     };
-    if own > loudest {
+    if own > loudest || kurtosis(residuals, &search.prepared.record, output) > BURSTS {
         return Ok(None);
     }
-    let falls = |before: f64, after: f64| after < (1.0 - LEAST) * before;
+    let falls = |before: f64, after: f64| after < (1.0 - FALL) * before;
     let block = ColouredNoise { output, coefficients: filter.clone(), innovation, deviation: own };
     Ok((falls(own, innovation) && falls(held_out, predicted)).then(|| block.into()))
 }
@@ -121,9 +127,39 @@ fn one_step(residuals: &[Matrix], record: &Record, output: usize, filter: &[f64]
     (deviation(own), deviation(left))
 }
 
+/// Fourth moment of a residual over the square of the second.
+fn kurtosis(residuals: &[Matrix], record: &Record, output: usize) -> f64 {
+    let (mut second, mut fourth, mut count) = (0.0, 0.0, 0.0);
+    for (residual, experiment) in residuals.iter().zip(record.experiments()) {
+        for k in experiment.scored_runs().flatten() {
+            let square = residual[(k, output)].powi(2);
+            second += square;
+            fourth += square * square;
+            count += 1.0;
+        }
+    }
+    fourth * count / (second * second).max(f64::MIN_POSITIVE)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sine_that_comes_and_goes_has_bursts() {
+        let nothing = |columns| Matrix::zeros(1000, columns);
+        let (input, output, covariates) = (nothing(1), nothing(1), nothing(0));
+        let run = crate::Experiment { input, output, covariates, warmup: 0, held_out: vec![] };
+        let channel = || vec![crate::Channel::new("a", "")];
+        let record = Record::new(vec![run], 1.0, channel(), channel(), vec![]).unwrap();
+        let of = |size: fn(usize) -> f64| {
+            let sine = |k: usize| (0.3 * k as f64).sin();
+            kurtosis(&[Matrix::from_fn(1000, 1, |k, _| size(k) * sine(k))], &record, 0)
+        };
+        assert!((of(|_| 2.0) - 1.5).abs() < 0.01);
+        let quarter = |k: usize| if k < 250 { 1.0 } else { 0.0 };
+        assert!((of(quarter) - 6.0).abs() < 0.1);
+    }
 
     #[test]
     fn samples_shortly_after_an_input_jumps_are_known() {

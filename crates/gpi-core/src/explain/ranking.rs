@@ -33,13 +33,23 @@ impl Search<'_> {
         families: &[&'static Entry],
         progress: Progress,
     ) -> Result<Vec<Ranked>, Error> {
+        /// What deadzones, plays and G take the shape of where one cycle repeats, for that cycle alone.
+        const ONE_CYCLE: [&str; 5] = [
+            "linear-dynamics",
+            "rate-dependence",
+            "hysteresis-shape",
+            "output-nonlinearity",
+            "stiffness",
+        ];
         let Self { prepared, options, .. } = self;
         let base = Base::new(point, &prepared.record, options.freedom, &options.weighting)?;
         let values = prepared.values();
         let present = |entry: &Entry| point.effects.iter().any(|e| e.name() == entry.name);
         // G of any order takes a delay for itself
         let of_use = |entry: &Entry| entry.name != "delay" || self.order_is_given;
-        let usable = |entry: &&&Entry| of_use(entry) && (entry.repeats || !present(entry));
+        let is_told = |entry: &Entry| !self.is_one_sine || !ONE_CYCLE.contains(&entry.name);
+        let usable =
+            |entry: &&&Entry| of_use(entry) && is_told(entry) && (entry.repeats || !present(entry));
         let (mut entries, mut candidates) = (Vec::new(), Vec::new());
         for &entry in families.iter().filter(usable) {
             let found = base.situation(entry.candidates);
@@ -52,7 +62,13 @@ impl Search<'_> {
         }
         let mut check = |done| report(progress, "score test", done);
         let mut best = Vec::new();
-        for (entry, score) in entries.into_iter().zip(scores(&base, &candidates, &mut check)?) {
+        let scores = scores(&base, &candidates, &mut check)?;
+        let is_slow: Vec<bool> = (0..scores.len()).map(|i| is_slow(&scores, i)).collect();
+        let scored = entries.into_iter().zip(scores).zip(is_slow);
+        for ((entry, score), is_slow) in scored {
+            if SLOW.contains(&entry.name) && !is_slow {
+                continue;
+            }
             let deviance = -values * (1.0 - score.gain).max(1e-300).ln();
             let worth = deviance - score.columns as f64 * values.ln();
             keep_best(&mut best, Ranked { entry, score, worth });
@@ -60,6 +76,19 @@ impl Search<'_> {
         best.sort_by(|a: &Ranked, b| b.worth.total_cmp(&a.worth));
         Ok(best)
     }
+}
+
+/// Functions of time that are slow, with more and more knots.
+pub(super) const SLOW: [&str; 2] = ["drift", "gain-drift"];
+
+/// Whether a function of time explains most of what it does with a quarter of its knots: else it follows
+/// something that is not slow.
+fn is_slow(scores: &[Score], place: usize) -> bool {
+    const MOST: f64 = 0.75;
+    let Some(coarser) = place.checked_sub(2).map(|place| &scores[place]) else { return true };
+    let score = &scores[place];
+    let has_a_quarter = 4 * coarser.columns == score.columns;
+    !has_a_quarter || coarser.gain > MOST * score.gain
 }
 
 fn keep_best(best: &mut Vec<Ranked>, one: Ranked) {

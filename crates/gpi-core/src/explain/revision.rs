@@ -1,6 +1,6 @@
 //! What was found is looked at again once more is known.
 
-use super::ranking::Ranked;
+use super::ranking::{Ranked, SLOW};
 use super::search::{Round, Search};
 use super::trial::Trial;
 use crate::effects::Entry;
@@ -31,6 +31,8 @@ impl Search<'_> {
 
     /// Drops effects that a later one has made superfluous.
     pub(super) fn backward(&mut self, progress: Progress) -> Result<(), Error> {
+        /// How much larger the squares of what is held out may be.
+        const WORSE: f64 = 1.5;
         let mut place = 0;
         while self.point.effects.len() > 1 && place < self.point.effects.len() {
             let entry = self.point.effects[place].entry();
@@ -42,7 +44,9 @@ impl Search<'_> {
             let fitted = self.without(place, progress)?;
             let lost = self.prepared.values() * (fitted.linearization.cost / self.cost).ln();
             let chance = self.rounds.last().map_or(0.0, |round| round.trial.chance);
-            if lost < chance {
+            let sum = |squares: Vec<f64>| squares.iter().sum::<f64>();
+            let (now, then) = (self.held_out(&self.point)?, self.held_out(&fitted.point)?);
+            if lost < chance && sum(then) < WORSE * sum(now) {
                 (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
                 if let Some(round) = self.rounds.last_mut() {
                     round.dropped.push(entry.name);
@@ -57,7 +61,6 @@ impl Search<'_> {
     /// Puts what the input drives in the place of a slow function of time, which fits much, where it explains
     /// as much.
     pub(super) fn prefer_driven(&mut self, progress: Progress) -> Result<(), Error> {
-        const SLOW: [&str; 2] = ["drift", "gain-drift"];
         /// How much larger the squares of what is held out may be.
         const WORSE: f64 = 1.05;
         let driven: Vec<&'static Entry> = self
@@ -86,11 +89,9 @@ impl Search<'_> {
             let Some(Trial { deviance, chance, .. }) = round.map(|round| &round.trial) else {
                 continue;
             };
-            let longest = record.experiments().iter().map(|e| e.input.nrows()).max();
-            let duration = longest.unwrap_or(0) as f64 / record.rate();
-            let is_plausible =
-                fitted.point.blocks().iter().all(|e| e.block().is_plausible(duration));
-            if lost < *chance && sum(then) < WORSE * sum(now) && is_plausible {
+            let is_plausible = self.is_plausible(&fitted.point);
+            let is_driven = self.is_driven(&without, &fitted.point)?;
+            if lost < *chance && sum(then) < WORSE * sum(now) && is_plausible && is_driven {
                 // what the slow function had gained, less what was lost with it
                 let deviance = deviance - lost;
                 let judged = self.judged(entry, fitted, gain, progress)?;

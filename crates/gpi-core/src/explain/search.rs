@@ -5,7 +5,7 @@ use super::grid::enriched;
 use super::lags::Before;
 use super::score::Base;
 use super::trial::{LEAST, Rejected, Trial, is_confirmed};
-use crate::effects::{CATALOGUE, Entry};
+use crate::effects::{CATALOGUE, Entry, is_one_sine};
 use crate::identify::NoiseFloor;
 use crate::identify::levenberg_marquardt::{FitOptions, fit};
 use crate::identify::point::Point;
@@ -33,6 +33,8 @@ pub(crate) struct Search<'a> {
     pub allowed: Vec<&'static Entry>,
     /// Whether a mode that G lacks is an effect; else it is an order that G was not given.
     pub order_is_given: bool,
+    /// Whether the record is one cycle that repeats.
+    pub is_one_sine: bool,
     /// Which grids may move and become finer.
     pub moving: RefineOptions,
     /// Whether the grids were placed anew since the latest effect.
@@ -65,6 +67,7 @@ impl<'a> Search<'a> {
         options.gain = 1e-5;
         Ok(Self {
             test: super::blocks::complement(&prepared.record)?,
+            is_one_sine: is_one_sine(&prepared.record),
             prepared,
             options,
             allowed,
@@ -124,12 +127,23 @@ impl<'a> Search<'a> {
         trials.sort_by(|a, b| (b.deviance - b.chance).total_cmp(&(a.deviance - a.chance)));
         let floor = self.floor()?;
         let sum = |squares: &[f64]| squares.iter().sum::<f64>();
-        let taken = trials.iter().position(|trial| {
+        let is_acceptable = |trial: &Trial| {
             let left = (trial.cost / self.cost).max(sum(&trial.held_out) / sum(&before));
             let weighty = left < 1.0 - SUBSTANTIAL
                 || trial.cost < NEAR * floor
                 || SIGNED.contains(&trial.entry.name);
-            trial.deviance > trial.chance && weighty && is_confirmed(&before, &trial.held_out)
+            let is_more = trial.is_driven && trial.deviance > trial.chance;
+            is_more && weighty && is_confirmed(&before, &trial.held_out)
+        };
+        let most = trials.iter().position(is_acceptable);
+        // of those that explain the same, one that a thing could be
+        let taken = most.map(|most| {
+            let best = &trials[most];
+            let as_much = |trial: &Trial| trial.deviance > best.deviance - best.chance;
+            let is_better = |trial: &Trial| {
+                as_much(trial) && is_acceptable(trial) && self.is_plausible(&trial.point)
+            };
+            trials.iter().position(is_better).unwrap_or(most)
         });
         let Some(taken) = taken else {
             self.last = trials.iter().map(|trial| self.reject(trial, None, &before)).collect();

@@ -8,6 +8,7 @@ use crate::identify::Progress;
 use crate::identify::levenberg_marquardt::{Fitted, fit};
 use crate::identify::point::{Layout, Point};
 use crate::identify::refine::Refined;
+use crate::linear::Section;
 use crate::{Error, Record};
 
 /// An effect that takes a smaller part of the residual's squares is of no use to anyone.
@@ -27,6 +28,8 @@ pub(crate) struct Trial {
     pub held_out: Vec<f64>,
     /// The part of the residual that the score test promised.
     pub promised: f64,
+    /// Whether the input makes it explain what it does, where it is an effect that the input drives.
+    pub is_driven: bool,
 }
 
 /// An effect that was tried and not taken.
@@ -53,7 +56,27 @@ impl Search<'_> {
         let start = self.start(&self.point, score)?;
         let record = &self.prepared.record;
         let fitted = fit(start, record, &self.options, entry.name, progress)?;
-        self.judged(entry, fitted, gain, progress)
+        let is_driven = self.is_driven(&self.point, &fitted.point)?;
+        Ok(Trial { is_driven, ..self.judged(entry, fitted, gain, progress)? })
+    }
+
+    /// Whether it is the input that makes the lags beside G explain what they do: those that begin in motion
+    /// also decay from wherever they began, and that is a function of time.
+    pub(super) fn is_driven(&self, without: &Point, with: &Point) -> Result<bool, Error> {
+        /// Part of the squares without the lags that must come back when nothing drives them.
+        const STILL: f64 = 0.5;
+        let is_beside = |own: &Section| own.beside.is_some();
+        let moves = with.pasts.iter().any(|past| past.moving);
+        if !moves || !with.dynamics.sections.iter().any(is_beside) {
+            return Ok(true);
+        }
+        let mut undriven = with.clone();
+        let beside = undriven.dynamics.sections.iter_mut().filter(|own| is_beside(own));
+        beside.for_each(|own| own.b.fill(0.0));
+        let sum = |point: &Point| -> Result<f64, Error> {
+            Ok(self.squares(point, &self.prepared.record)?.iter().sum())
+        };
+        Ok(sum(&undriven)? > STILL * sum(without)?)
     }
 
     /// A point with one more effect: as the score test suggests it, or without effect yet where that is
@@ -71,6 +94,14 @@ impl Search<'_> {
         };
         let is_near = squares(&start)? <= BEYOND * squares(base)?;
         Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })
+    }
+
+    /// Whether every effect has values that a thing could have.
+    pub(super) fn is_plausible(&self, point: &Point) -> bool {
+        let record = &self.prepared.record;
+        let longest = record.experiments().iter().map(|e| e.input.nrows()).max();
+        let duration = longest.unwrap_or(0) as f64 / record.rate();
+        point.blocks().iter().all(|effect| effect.block().is_plausible(duration))
     }
 
     pub(super) fn judged(
@@ -96,7 +127,7 @@ impl Search<'_> {
             chance = chance.max(colour * white);
         }
         let held_out = self.held_out(&point)?;
-        Ok(Trial { entry, point, cost, deviance, chance, held_out, promised })
+        Ok(Trial { entry, point, cost, deviance, chance, held_out, promised, is_driven: true })
     }
 
     pub(super) fn layout_len(&self) -> usize {
@@ -129,14 +160,17 @@ impl Search<'_> {
     }
 
     pub(super) fn reject(&self, trial: &Trial, taken: Option<&Trial>, before: &[f64]) -> Rejected {
+        const DECAY: &str = "is a decay here, which the input does not drive";
         let holdout_rms = self.holdout_rms(&trial.held_out);
         let (mut why, mut confounded_with) = (String::new(), Vec::new());
         match taken {
+            Some(_) if !trial.is_driven => why.push_str(DECAY),
             Some(taken) if trial.deviance > taken.deviance - taken.chance => {
                 why = format!("explains as much as {}", taken.entry.name);
                 confounded_with.push(taken.entry.name);
             }
             Some(taken) => why = format!("{} explains more", taken.entry.name),
+            None if !trial.is_driven => why.push_str(DECAY),
             None if trial.deviance <= trial.chance => {
                 why.push_str("gains no more than chance would");
             }

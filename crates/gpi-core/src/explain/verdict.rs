@@ -3,6 +3,7 @@
 use super::residual::{ResidualTest, STRUCTURE};
 use super::trial::Rejected;
 use crate::Record;
+use crate::effects::is_one_sine;
 
 /// How far what was measured is explained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -112,6 +113,11 @@ pub(crate) fn next_experiment(
     }
     if verdict == Verdict::Explained {
         return None;
+    }
+    if is_one_sine(record) {
+        let why = "one cycle that repeats cannot tell a sensor's curve, a loop's shape, stiffness or a mode \
+                   from the declared model; drive triangles of several sizes";
+        return Some(NextExperiment { why: why.to_owned(), command: triangle });
     }
     let worst = tests
         .iter()
