@@ -39,6 +39,9 @@ def piezo() -> None:
             f"  {name:24s} {100 * error / PIEZO_SPAN:.3f} %   chosen: delay {chosen['delay']} samples, order "
             f"{chosen['order']}, {chosen['plays']} plays, {chosen['deadzones']} deadzones"
         )
+    found = gpi.explain(train)
+    error = found.model.error(test, remove_mean=True, fit_start=True)["rms"]
+    print(f"  explained: {', '.join(found.effects)}: {100 * error / PIEZO_SPAN:.3f} % (aim: 0.30)")
 
 
 def relative(error: NDArray[np.float64], measured: NDArray[np.float64]) -> float:

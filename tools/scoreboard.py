@@ -10,7 +10,8 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,38 @@ SINGLE = [name for name in plants.CATALOGUE if name not in ("delay", "linear-dyn
 POWER_STRENGTHS = (0.2, 0.5, 1.0, 2.0, 3.0)  # rms over that of the noise
 
 Job = tuple[Callable[..., Result], tuple[object, ...]]
+
+
+class Kept:
+    """Results in a file, from which work that was stopped goes on."""
+
+    def __init__(self, path: Path | None) -> None:
+        """Read what an earlier run has kept."""
+        self.path = path
+        self.results: dict[str, Result] = {}
+        if path is not None and path.exists():
+            for name, values in json.loads(path.read_text()).items():
+                names = {key: tuple(values[key]) for key in ("wanted", "found")}
+                self.results[name] = Result(**{**values, **names})
+
+    @staticmethod
+    def name(job: Job) -> str:
+        """Return what tells jobs apart."""
+        function, values = job
+        return " ".join([function.__name__, *map(str, values)])
+
+    def find(self, job: Job) -> Result | None:
+        """Return the job's result, if it was done before."""
+        return self.results.get(self.name(job))
+
+    def add(self, job: Job, result: Result) -> Result:
+        """Keep a result."""
+        self.results[self.name(job)] = result
+        if self.path is not None:
+            known = {name: asdict(result) for name, result in self.results.items()}
+            write_atomically(self.path, json.dumps(known, indent=1))
+        return result
+
 
 HEAD = (
     f"  {'record':34s} {'wanted':44s} {'found':44s} {'verdict':16s} {'before':>8s} {'after':>6s} "
@@ -72,13 +105,15 @@ def power_work(arguments: argparse.Namespace) -> Iterator[Job]:
                 yield simulated, (arguments.seed + number, (name,), strength, arguments.seconds)
 
 
-def run(pool: ProcessPoolExecutor, work: Iterable[Job]) -> list[Result]:
-    """Do the work, printing one line a record in the order of the work."""
-    jobs = [pool.submit(function, *values) for function, values in work]
+def run(pool: Executor, work: Iterable[Job], kept: Kept) -> list[Result]:
+    """Do the work that is not kept yet, printing one line a record in the order of the work."""
+    jobs = [(job, None if kept.find(job) else pool.submit(job[0], *job[1])) for job in work]
     results = []
-    for job in jobs:
-        results.append(job.result())
-        print(line(results[-1]), flush=True)
+    for job, running in jobs:
+        result = kept.find(job) if running is None else kept.add(job, running.result())
+        assert result is not None
+        results.append(result)
+        print(line(result), flush=True)
     return results
 
 
@@ -102,11 +137,13 @@ def main() -> None:
     parser.add_argument("--power", action="store_true", help="single effects near the noise as well")
     parser.add_argument("--power-seeds", type=int, default=3, help="plants an effect and strength")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="such as docs/scoreboard.md")
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="keep results there, go on from those kept")
     arguments = parser.parse_args()
+    kept = Kept(arguments.keep)
     print(HEAD, flush=True)
     with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
-        mixed = run(pool, mixed_work(arguments))
-        near_noise = run(pool, power_work(arguments) if arguments.power else [])
+        mixed = run(pool, mixed_work(arguments), kept)
+        near_noise = run(pool, power_work(arguments) if arguments.power else [], kept)
     tables = []
     if mixed:
         tables += [score_tables.singles(mixed), score_tables.by_number(mixed), score_tables.summary(mixed)]

@@ -90,7 +90,10 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
     before, after = (result["error"][when]["holdout"]["rms"] for when in ("before", "after"))
     names = effect_names()
     if not result["effects"]:
-        yield "No effect of the catalogue is missing from the model beyond chance."
+        if result["verdict"] == "explained":
+            yield "The model lacks nothing: what is left is noise."
+        else:
+            yield "No effect of the catalogue explains what is left."
     elif after >= before:
         yield (
             f"The model lacked {join(result['effects'])}. On the held-out record the error goes from "

@@ -1,8 +1,12 @@
 """The scoreboard counts what it says."""
 
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
 import pytest
 
 import score_tables
+import scoreboard
 from scores import Result
 
 
@@ -80,3 +84,22 @@ def test_a_table_as_text_and_as_markdown() -> None:
     table = score_tables.Table("Title", ("a", "long head"), [("cell of a", "1")])
     assert table.text() == "\nTitle\n  a          long head\n  cell of a  1"
     assert table.markdown() == "## Title\n\n| a | long head |\n| --- | --- |\n| cell of a | 1 |\n"
+
+
+def test_what_was_kept_is_not_done_again(tmp_path: Path) -> None:
+    calls = []
+
+    def work(seed: int) -> Result:
+        calls.append(seed)
+        return result("creep drift", "creep")
+
+    path = tmp_path / "kept.json"
+    first = scoreboard.Kept(path)
+    first.add((work, (1,)), work(1))
+    again = scoreboard.Kept(path)
+    assert again.find((work, (1,))) == result("creep drift", "creep")
+    assert again.find((work, (2,))) is None
+    with ThreadPoolExecutor(1) as pool:
+        results = scoreboard.run(pool, [(work, (1,)), (work, (2,))], again)
+    assert len(results) == 2
+    assert calls == [1, 2]

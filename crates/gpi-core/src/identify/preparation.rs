@@ -46,7 +46,9 @@ impl<'a> Prepared<'a> {
         let mut unknown_past = vec![false; experiments.len()];
         let mut moving = vec![false; experiments.len()];
         for (index, experiment) in experiments.iter_mut().enumerate() {
-            if starts_at_rest(experiment) || experiment.warmup > 0 {
+            // A warm-up is there to hide the past, but where plays stick it never ends.
+            let is_hidden = experiment.warmup > 0 && fraction > 0.0;
+            if starts_at_rest(experiment) || is_hidden {
                 continue;
             }
             moving[index] = true;
