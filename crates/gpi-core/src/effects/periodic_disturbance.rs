@@ -88,9 +88,9 @@ fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
 /// may have at each line. A line that is no stronger says nothing of a disturbance.
 fn driven(situation: &Situation, experiment: usize, output: usize) -> Option<Vec<f64>> {
     /// The n-th harmonic of a misfit is at most this over n of the displacement's fundamental.
-    const MISFIT: f64 = 0.1;
+    const MISFIT: f64 = 0.02;
     /// Part of the input's power.
-    const MOST: f64 = 0.5;
+    const MOST: f64 = 0.9;
     let [drive] = situation.drives[experiment].column_iter().collect::<Vec<_>>()[..] else {
         return None;
     };

@@ -104,8 +104,9 @@ impl<'a> Search<'a> {
         /// Where no family promises this much, no fit would reach what an effect has to gain.
         const HOPELESS: f64 = 0.5 * LEAST;
         /// Far from the noise, what a misfit leaves looks like many effects a little: there an effect must
-        /// take this part of the squares, on what is held out too.
+        /// take this part of the squares, and not much less of those that are held out.
         const SUBSTANTIAL: f64 = 0.3;
+        const HELD_OUT: f64 = 0.2;
         /// Squares over those of the noise.
         const NEAR: f64 = 2.25;
         /// Effects with a signature that no misfit has.
@@ -128,12 +129,13 @@ impl<'a> Search<'a> {
         let floor = self.floor()?;
         let sum = |squares: &[f64]| squares.iter().sum::<f64>();
         let is_acceptable = |trial: &Trial| {
-            let left = (trial.cost / self.cost).max(sum(&trial.held_out) / sum(&before));
-            let weighty = left < 1.0 - SUBSTANTIAL
-                || trial.cost < NEAR * floor
-                || SIGNED.contains(&trial.entry.name);
+            let takes = |part: f64, after: f64, before: f64| after < (1.0 - part) * before;
+            let is_substantial = takes(SUBSTANTIAL, trial.cost, self.cost)
+                && takes(HELD_OUT, sum(&trial.held_out), sum(&before));
+            let is_weighty =
+                is_substantial || trial.cost < NEAR * floor || SIGNED.contains(&trial.entry.name);
             let is_more = trial.is_driven && trial.deviance > trial.chance;
-            is_more && weighty && is_confirmed(&before, &trial.held_out)
+            is_more && is_weighty && is_confirmed(&before, &trial.held_out)
         };
         let most = trials.iter().position(is_acceptable);
         // of those that explain the same, one that a thing could be
