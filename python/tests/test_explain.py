@@ -61,6 +61,8 @@ def test_a_clean_record_lacks_nothing(seed):
     assert found.after["holdout"]["rms"] < 1.1 * plant.noise_std
     # a hundredth of the residual's variance may be left in its correlations
     assert found.verdict == "explained" or seed == 1
+    lacks_nothing = next(iter(in_words(found.to_dict()))).startswith("The model lacks nothing")
+    assert lacks_nothing == (found.verdict == "explained")
 
 
 def test_only_allowed_effects_are_added():

@@ -37,6 +37,8 @@ pub mod linear;
 mod model;
 #[cfg(feature = "identify")]
 mod record;
+#[cfg(feature = "identify")]
+mod spectrum;
 
 #[cfg(feature = "identify")]
 pub use error::{Error, ErrorKind};

@@ -21,7 +21,6 @@ mod output_nonlinearity;
 mod periodic_disturbance;
 mod rate_dependence;
 mod situation;
-mod spectrum;
 mod stiffness;
 
 pub use amplifier_slew::AmplifierSlew;
@@ -43,7 +42,6 @@ pub use stiffness::Stiffness;
 
 pub(crate) use creep::SHORTEST as SHORTEST_CREEP;
 pub(crate) use situation::{Candidate, Situation};
-pub(crate) use spectrum::is_one_sine;
 
 /// Declares [`Effect`], one variant an effect, and [`CATALOGUE`].
 macro_rules! catalogue {

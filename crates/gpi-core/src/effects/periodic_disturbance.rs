@@ -1,7 +1,7 @@
 //! A line that the input does not drive.
 
-use super::spectrum::{Strongest, near, peak, power};
 use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
+use crate::spectrum::{Strongest, near, peak, power};
 
 /// `y += a cos(2 pi f t) + b sin(2 pi f t)`: mains hum, a pump, a vibration.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -84,7 +84,7 @@ fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
     Some(peak(&power, line) * situation.record.rate() / n as f64)
 }
 
-/// Where the input is little but one line (a sine, a triangle): the power that a misfit of what it drives
+/// Where the one input is little but one line (a sine, a triangle): the power that a misfit of what it drives
 /// may have at each line. A line that is no stronger says nothing of a disturbance.
 fn driven(situation: &Situation, experiment: usize, output: usize) -> Option<Vec<f64>> {
     /// The n-th harmonic of a misfit is at most this over n of the displacement's fundamental.

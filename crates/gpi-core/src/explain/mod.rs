@@ -23,12 +23,12 @@ mod search;
 mod trial;
 mod verdict;
 
-use crate::effects::is_one_sine;
 use crate::identify::chain::{compare, prepare};
 use crate::identify::levenberg_marquardt::fit;
 use crate::identify::preparation::starts_at_rest;
 use crate::identify::refine::{RefineOptions, Refined, settings};
 use crate::identify::{Grid, IdentifyOptions, Progress, Refinement};
+use crate::spectrum::is_one_sine;
 use crate::{Error, Matrix, Record};
 use explanation::summarise;
 pub use explanation::{Errors, Explanation, Step};

@@ -81,14 +81,15 @@ impl Search<'_> {
 /// Functions of time that are slow, with more and more knots.
 pub(super) const SLOW: [&str; 2] = ["drift", "gain-drift"];
 
-/// Whether a function of time explains most of what it does with a quarter of its knots: else it follows
-/// something that is not slow.
+/// Whether a function of time explains most of what it does with a quarter of its knots, as the score two
+/// places before tells: else it follows something that is not slow.
 fn is_slow(scores: &[Score], place: usize) -> bool {
     const MOST: f64 = 0.75;
-    let Some(coarser) = place.checked_sub(2).map(|place| &scores[place]) else { return true };
+    let knots = |score: &Score| score.start.block().values().len();
     let score = &scores[place];
-    let has_a_quarter = 4 * coarser.columns == score.columns;
-    !has_a_quarter || coarser.gain > MOST * score.gain
+    let coarser = place.checked_sub(2).map(|place| &scores[place]);
+    let coarser = coarser.filter(|coarser| 4 * knots(coarser) == knots(score));
+    coarser.is_none_or(|coarser| coarser.gain > MOST * score.gain)
 }
 
 fn keep_best(best: &mut Vec<Ranked>, one: Ranked) {
@@ -96,5 +97,28 @@ fn keep_best(best: &mut Vec<Ranked>, one: Ranked) {
         Some(known) if known.worth < one.worth => *known = one,
         Some(_) => {}
         None => best.push(one),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::GainDrift;
+
+    #[test]
+    fn what_needs_all_its_knots_is_not_slow() {
+        let score = |knots: usize, gain: f64| Score {
+            start: GainDrift { output: 0, changes: vec![0.0; knots], duration: 1.0 }.into(),
+            zero: None,
+            gain,
+            columns: knots,
+        };
+        let of = |gains: [f64; 6]| {
+            let ladder = [1, 2, 4, 8, 16, 32].into_iter().zip(gains);
+            let scores: Vec<Score> = ladder.map(|(knots, gain)| score(knots, gain)).collect();
+            (0..6).map(|place| is_slow(&scores, place)).collect::<Vec<_>>()
+        };
+        assert_eq!(of([0.54, 0.79, 0.81, 0.94, 0.95, 0.95]), [true, true, false, true, true, true]);
+        assert_eq!(of([0.0, 0.01, 0.05, 0.17, 0.36, 0.42])[2..], [false; 4]);
     }
 }

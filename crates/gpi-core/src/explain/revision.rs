@@ -44,9 +44,8 @@ impl Search<'_> {
             let fitted = self.without(place, progress)?;
             let lost = self.prepared.values() * (fitted.linearization.cost / self.cost).ln();
             let chance = self.rounds.last().map_or(0.0, |round| round.trial.chance);
-            let sum = |squares: Vec<f64>| squares.iter().sum::<f64>();
-            let (now, then) = (self.held_out(&self.point)?, self.held_out(&fitted.point)?);
-            if lost < chance && sum(then) < WORSE * sum(now) {
+            let then = self.held_out(&fitted.point)?;
+            if lost < chance && self.holds_up(&then, WORSE)? {
                 (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
                 if let Some(round) = self.rounds.last_mut() {
                     round.dropped.push(entry.name);
@@ -83,25 +82,28 @@ impl Search<'_> {
             let start = self.start(&without, score)?;
             let fitted = fit(start, record, &options, entry.name, progress)?;
             let lost = self.prepared.values() * (fitted.linearization.cost / self.cost).ln();
-            let sum = |squares: Vec<f64>| squares.iter().sum::<f64>();
-            let (now, then) = (self.held_out(&self.point)?, self.held_out(&fitted.point)?);
             let round = self.rounds.iter().find(|round| round.trial.entry.name == name);
             let Some(Trial { deviance, chance, .. }) = round.map(|round| &round.trial) else {
                 continue;
             };
-            let is_plausible = self.is_plausible(&fitted.point);
-            let is_driven = self.is_driven(&without, &fitted.point)?;
-            if lost < *chance && sum(then) < WORSE * sum(now) && is_plausible && is_driven {
-                // what the slow function had gained, less what was lost with it
-                let deviance = deviance - lost;
-                let judged = self.judged(entry, fitted, gain, progress)?;
-                let trial = Trial { deviance, ..judged };
+            // what the slow function had gained, less what is lost with it
+            let (deviance, is_as_good) = (deviance - lost, lost < *chance);
+            let judged = self.judged(&without, entry, fitted, gain, progress)?;
+            let trial = Trial { deviance, ..judged };
+            let is_sound = trial.is_driven && self.is_plausible(&trial.point);
+            if is_as_good && is_sound && self.holds_up(&trial.held_out, WORSE)? {
                 (self.point, self.cost) = (trial.point.clone(), trial.cost);
                 self.rounds.push(Round { trial, others: Vec::new(), dropped: vec![name] });
                 self.repair()?;
             }
         }
         Ok(())
+    }
+
+    /// Whether the squares of what is held out have grown by less than this factor.
+    fn holds_up(&self, held_out: &[f64], factor: f64) -> Result<bool, Error> {
+        let sum = |squares: &[f64]| squares.iter().sum::<f64>();
+        Ok(sum(held_out) < factor * sum(&self.held_out(&self.point)?))
     }
 
     /// The best fit without one of the effects. The newest starts from the score test anew too: beside the
@@ -150,7 +152,7 @@ impl Search<'_> {
         self.wrong = outliers::places(&residuals, &everything(&self.measured)?, 0);
         self.prepared.record = repaired(&self.measured, &residuals, &self.wrong)?;
         // what the next fits are compared with
-        self.cost = self.squares(&self.point, &self.prepared.record)?.iter().sum();
+        self.cost = self.training_squares(&self.point)?;
         Ok(())
     }
 }

@@ -5,13 +5,14 @@ use super::grid::enriched;
 use super::lags::Before;
 use super::score::Base;
 use super::trial::{LEAST, Rejected, Trial, is_confirmed};
-use crate::effects::{CATALOGUE, Entry, is_one_sine};
+use crate::effects::{CATALOGUE, Entry};
 use crate::identify::NoiseFloor;
 use crate::identify::levenberg_marquardt::{FitOptions, fit};
 use crate::identify::point::Point;
 use crate::identify::preparation::Prepared;
 use crate::identify::refine::{RefineOptions, Refined, settings};
 use crate::identify::{Progress, report};
+use crate::spectrum::is_one_sine;
 use crate::{Error, Record};
 
 /// A round of the search.

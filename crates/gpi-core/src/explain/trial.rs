@@ -56,13 +56,12 @@ impl Search<'_> {
         let start = self.start(&self.point, score)?;
         let record = &self.prepared.record;
         let fitted = fit(start, record, &self.options, entry.name, progress)?;
-        let is_driven = self.is_driven(&self.point, &fitted.point)?;
-        Ok(Trial { is_driven, ..self.judged(entry, fitted, gain, progress)? })
+        self.judged(&self.point, entry, fitted, gain, progress)
     }
 
     /// Whether it is the input that makes the lags beside G explain what they do: those that begin in motion
     /// also decay from wherever they began, and that is a function of time.
-    pub(super) fn is_driven(&self, without: &Point, with: &Point) -> Result<bool, Error> {
+    fn is_driven(&self, without: &Point, with: &Point) -> Result<bool, Error> {
         /// Part of the squares without the lags that must come back when nothing drives them.
         const STILL: f64 = 0.5;
         let is_beside = |own: &Section| own.beside.is_some();
@@ -73,10 +72,7 @@ impl Search<'_> {
         let mut undriven = with.clone();
         let beside = undriven.dynamics.sections.iter_mut().filter(|own| is_beside(own));
         beside.for_each(|own| own.b.fill(0.0));
-        let sum = |point: &Point| -> Result<f64, Error> {
-            Ok(self.squares(point, &self.prepared.record)?.iter().sum())
-        };
-        Ok(sum(&undriven)? > STILL * sum(without)?)
+        Ok(self.training_squares(&undriven)? > STILL * self.training_squares(without)?)
     }
 
     /// A point with one more effect: as the score test suggests it, or without effect yet where that is
@@ -89,10 +85,7 @@ impl Search<'_> {
         let block = score.start.block();
         let mut limits = block.values().into_iter().zip(block.bounds());
         let is_sensible = limits.all(|(value, (low, high))| low <= value && value <= high);
-        let squares = |point: &Point| -> Result<f64, Error> {
-            Ok(self.squares(point, &self.prepared.record)?.iter().sum())
-        };
-        let is_near = squares(&start)? <= BEYOND * squares(base)?;
+        let is_near = self.training_squares(&start)? <= BEYOND * self.training_squares(base)?;
         Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })
     }
 
@@ -104,8 +97,10 @@ impl Search<'_> {
         point.blocks().iter().all(|effect| effect.block().is_plausible(duration))
     }
 
+    /// What a fit brought over the present model; `without` is what the effect was added to.
     pub(super) fn judged(
         &self,
+        without: &Point,
         entry: &'static Entry,
         fitted: Fitted,
         promised: f64,
@@ -127,11 +122,17 @@ impl Search<'_> {
             chance = chance.max(colour * white);
         }
         let held_out = self.held_out(&point)?;
-        Ok(Trial { entry, point, cost, deviance, chance, held_out, promised, is_driven: true })
+        let is_driven = self.is_driven(without, &point)?;
+        Ok(Trial { entry, point, cost, deviance, chance, held_out, promised, is_driven })
     }
 
     pub(super) fn layout_len(&self) -> usize {
         Layout::new(&self.point, self.options.freedom).len
+    }
+
+    /// Sum of squares of what the training scores.
+    pub(super) fn training_squares(&self, point: &Point) -> Result<f64, Error> {
+        Ok(self.squares(point, &self.prepared.record)?.iter().sum())
     }
 
     /// Sum of squares of every held-out block.
@@ -140,7 +141,7 @@ impl Search<'_> {
     }
 
     /// Sum of squares of every run that `scored` scores.
-    pub(super) fn squares(&self, point: &Point, scored: &Record) -> Result<Vec<f64>, Error> {
+    fn squares(&self, point: &Point, scored: &Record) -> Result<Vec<f64>, Error> {
         // run over the training record, whose starts were fitted
         let residuals = point.residuals(&self.prepared.record)?;
         let weights = &self.options.weighting.outputs;
@@ -160,17 +161,17 @@ impl Search<'_> {
     }
 
     pub(super) fn reject(&self, trial: &Trial, taken: Option<&Trial>, before: &[f64]) -> Rejected {
-        const DECAY: &str = "is a decay here, which the input does not drive";
         let holdout_rms = self.holdout_rms(&trial.held_out);
         let (mut why, mut confounded_with) = (String::new(), Vec::new());
         match taken {
-            Some(_) if !trial.is_driven => why.push_str(DECAY),
+            _ if !trial.is_driven => {
+                why.push_str("is a decay here, which the input does not drive");
+            }
             Some(taken) if trial.deviance > taken.deviance - taken.chance => {
                 why = format!("explains as much as {}", taken.entry.name);
                 confounded_with.push(taken.entry.name);
             }
             Some(taken) => why = format!("{} explains more", taken.entry.name),
-            None if !trial.is_driven => why.push_str(DECAY),
             None if trial.deviance <= trial.chance => {
                 why.push_str("gains no more than chance would");
             }

@@ -3,7 +3,7 @@
 use super::residual::{ResidualTest, STRUCTURE};
 use super::trial::Rejected;
 use crate::Record;
-use crate::effects::is_one_sine;
+use crate::spectrum::is_one_sine;
 
 /// How far what was measured is explained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

@@ -4,6 +4,7 @@ use super::chance::exceeded_with;
 use super::{Beside, ResidualTest};
 use crate::Matrix;
 use crate::identify::colour::Colour;
+use crate::spectrum::tapered;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
@@ -35,7 +36,7 @@ fn without_lines(values: &[f64]) -> Vec<f64> {
     /// Times the median on either side, of which one is higher on a slope.
     const STANDS_OUT: f64 = 12.0;
     let n = values.len();
-    let mut spectrum = tapered_spectrum(values);
+    let mut spectrum = tapered(values);
     let power: Vec<f64> = spectrum[..n / 2].iter().map(Complex64::norm_sqr).collect();
     for k in NEAR + 1..power.len() - NEAR {
         let below = median(&power[k.saturating_sub(FAR).max(1)..=k - NEAR]);
@@ -83,7 +84,7 @@ fn periodogram(values: &[f64]) -> Vec<f64> {
     if n < 4 * AROUND {
         return Vec::new();
     }
-    let spectrum = tapered_spectrum(values);
+    let spectrum = tapered(values);
     spectrum[SLOWEST..n / 2].iter().map(Complex64::norm_sqr).collect()
 }
 
@@ -92,17 +93,6 @@ fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// The transform of a signal without its mean under Hann's window.
-fn tapered_spectrum(values: &[f64]) -> Vec<Complex64> {
-    let n = values.len();
-    let mean = values.iter().sum::<f64>() / n as f64;
-    let window = |k: usize| (std::f64::consts::PI * (k as f64 + 0.5) / n as f64).sin().powi(2);
-    let tapered = |(k, value): (usize, &f64)| Complex64::new((value - mean) * window(k), 0.0);
-    let mut spectrum: Vec<Complex64> = values.iter().enumerate().map(tapered).collect();
-    FftPlanner::new().plan_fft_forward(n).process(&mut spectrum);
-    spectrum
 }
 
 /// The chance that one exponential number exceeds the median of the others by this ratio.

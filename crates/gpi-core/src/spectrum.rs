@@ -5,22 +5,24 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 use std::ops::Range;
 
-/// Power of the lines of a Hann window, the mean left out.
-pub(super) fn power(values: &[f64]) -> Vec<f64> {
+/// The transform of a signal without its mean under Hann's window.
+pub(crate) fn tapered(values: &[f64]) -> Vec<Complex64> {
     let n = values.len();
     let mean = values.iter().sum::<f64>() / n as f64;
     let window = |k: usize| (std::f64::consts::PI * (k as f64 + 0.5) / n as f64).sin().powi(2);
-    let mut spectrum: Vec<Complex64> = values
-        .iter()
-        .enumerate()
-        .map(|(k, value)| Complex64::new((value - mean) * window(k), 0.0))
-        .collect();
+    let tapered = |(k, value): (usize, &f64)| Complex64::new((value - mean) * window(k), 0.0);
+    let mut spectrum: Vec<Complex64> = values.iter().enumerate().map(tapered).collect();
     FftPlanner::new().plan_fft_forward(n).process(&mut spectrum);
-    spectrum[..n / 2].iter().map(Complex64::norm_sqr).collect()
+    spectrum
+}
+
+/// Power of the lines below half the rate.
+pub(crate) fn power(values: &[f64]) -> Vec<f64> {
+    tapered(values)[..values.len() / 2].iter().map(Complex64::norm_sqr).collect()
 }
 
 /// Where between the lines the peak at `line` is: the ratio of two neighbours in Hann's main lobe tells it.
-pub(super) fn peak(power: &[f64], line: usize) -> f64 {
+pub(crate) fn peak(power: &[f64], line: usize) -> f64 {
     let size = |place: usize| power.get(place).map_or(0.0, |value| value.sqrt());
     let (below, here, above) = (line.checked_sub(1).map_or(0.0, size), size(line), size(line + 1));
     let shift = if above > below {
@@ -32,14 +34,14 @@ pub(super) fn peak(power: &[f64], line: usize) -> f64 {
 }
 
 /// The lines that a slowly changing amplitude spreads one line over.
-pub(super) fn near(place: f64, count: usize) -> Range<usize> {
+pub(crate) fn near(place: f64, count: usize) -> Range<usize> {
     const NEAR: usize = 5;
     let line = place.round() as usize;
     line.saturating_sub(NEAR).min(count)..(line + NEAR + 1).min(count)
 }
 
 /// The strongest line of a spectrum.
-pub(super) struct Strongest {
+pub(crate) struct Strongest {
     /// Where it is, in lines.
     pub place: f64,
     /// The part of the power that is near it.
@@ -48,7 +50,7 @@ pub(super) struct Strongest {
 
 impl Strongest {
     /// None where the strongest is too slow to be told from a trend.
-    pub(super) fn of(power: &[f64]) -> Option<Self> {
+    pub(crate) fn of(power: &[f64]) -> Option<Self> {
         const SLOWEST: usize = 10;
         let line = (0..power.len()).max_by(|&i, &j| power[i].total_cmp(&power[j]))?;
         let around: f64 = power[near(line as f64, power.len())].iter().sum();
