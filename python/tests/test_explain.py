@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import gpi_hammerstein as gpi
 import plants
@@ -63,6 +64,29 @@ def test_a_clean_record_lacks_nothing(seed):
     assert found.verdict == "explained" or seed == 1
     lacks_nothing = next(iter(in_words(found.to_dict()))).startswith("The model lacks nothing")
     assert lacks_nothing == (found.verdict == "explained")
+
+
+def test_loops_that_open_with_speed_are_fitted_on_grids_that_move():
+    # without it, what the grid has bent to is taken for a shape of the loops
+    plant, found = explained(8024, ("rate-dependence",), 20.0)
+    assert found.effects == ["rate-dependence"]
+    assert found.after["holdout"]["rms"] < 1.1 * plant.noise_std
+
+
+def test_creep_is_named_where_samples_are_too_slow_to_show_dynamics():
+    rate, random = 10.0, np.random.default_rng(1)
+    levels = np.repeat(random.uniform(0.0, 10.0, 60), 50)
+    u = np.concatenate([np.zeros(20), levels])
+    y = 2.0 * u + 0.005 * random.standard_normal(len(u))
+    for time_constant, gain in ((3.0, 0.2), (30.0, 0.3)):
+        pole = np.exp(-1 / (rate * time_constant))
+        y += scipy.signal.lfilter([0.0, gain * (1 - pole)], [1.0, -pole], u)
+    found = gpi.explain(gpi.Record(u, y, rate=rate))
+    assert found.effects == ["creep"]
+    found_times = [q["value"] for q in found.steps[1]["parameters"] if q["name"].startswith("time_constant")]
+    for time_constant in (3.0, 30.0):
+        assert min(abs(value / time_constant - 1) for value in found_times) < 0.1
+    assert found.after["holdout"]["rms"] < 1.1 * 0.005
 
 
 def test_only_allowed_effects_are_added():

@@ -16,8 +16,13 @@ pub struct Creep {
     pub dead_time: usize,
 }
 
-/// Shorter lags are dynamics.
-pub(crate) const SHORTEST: f64 = 0.03;
+/// Shorter lags, in seconds, are dynamics; so are those that die out within a few samples.
+pub(crate) fn shortest(rate: f64) -> f64 {
+    const SECONDS: f64 = 0.03;
+    const SAMPLES: f64 = 5.0;
+    SECONDS.max(SAMPLES / rate)
+}
+
 /// Longer ones are a drift in proportion to the integral of v.
 const LONGEST: f64 = 3e3;
 
@@ -28,9 +33,10 @@ impl Creep {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
 
-    /// One, two and three lags between 0.05 s and the record's length.
+    /// One, two and three lags between somewhat more than the shortest and the record's length.
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
-        let (low, high) = (0.05, situation.duration());
+        const MORE: f64 = 5.0 / 3.0;
+        let (low, high) = (MORE * shortest(situation.record.rate()), situation.duration());
         if situation.outputs().len() > 1 || high < 4.0 * low {
             return Vec::new();
         }
@@ -114,7 +120,7 @@ impl Block for Creep {
 
     fn section_bounds(&self, rate: f64) -> (f64, f64) {
         let a1 = |time: f64| -(-1.0 / (time * rate)).exp();
-        (a1(LONGEST), a1(SHORTEST))
+        (a1(LONGEST), a1(shortest(rate)))
     }
 }
 

@@ -88,7 +88,8 @@ impl Search<'_> {
             };
             // what the slow function had gained, less what is lost with it
             let (deviance, is_as_good) = (deviance - lost, lost < *chance);
-            let judged = self.judged(&without, entry, fitted, gain, progress)?;
+            let judged =
+                self.judged(&without, entry, fitted, self.options.clone(), gain, progress)?;
             let trial = Trial { deviance, ..judged };
             let is_sound = trial.is_driven && self.is_plausible(&trial.point);
             if is_as_good && is_sound && self.holds_up(&trial.held_out, WORSE)? {
@@ -111,16 +112,17 @@ impl Search<'_> {
     fn without(&self, place: usize, progress: Progress) -> Result<Fitted, Error> {
         let record = &self.prepared.record;
         let without = self.point.without_effect(place);
-        let fitted = fit(without.clone(), record, &self.options, "backward step", progress)?;
-        let newest = self.rounds.last().map(|round| round.trial.entry);
-        let Some(newest) = newest.filter(|entry| entry.driven) else { return Ok(fitted) };
+        let Some(newest) = self.rounds.last().map(|round| round.trial.entry) else {
+            return fit(without, record, &self.options, "backward step", progress);
+        };
+        let (fitted, _) = self.fitted(without.clone(), newest, progress)?;
         let own = without.effects.iter().rposition(|effect| effect.name() == newest.name);
-        let Some(own) = own else { return Ok(fitted) };
+        let Some(own) = own.filter(|_| newest.driven) else { return Ok(fitted) };
         let point = without.without_effect(own);
         let best = self.scored_beside(&point, &[newest], progress)?.into_iter().next();
         let Some(best) = best else { return Ok(fitted) };
         let start = self.start(&point, best.score)?;
-        let anew = fit(start, record, &self.options, "backward step", progress)?;
+        let (anew, _) = self.fitted(start, newest, progress)?;
         let is_better = anew.linearization.cost < fitted.linearization.cost;
         Ok(if is_better { anew } else { fitted })
     }

@@ -212,13 +212,17 @@ impl<'a> Search<'a> {
         Base::new(point, &prepared.record, options.freedom, &options.weighting)
     }
 
+    /// All that is free, grids that were not given included.
+    pub(super) fn moving_grids(&self) -> FitOptions {
+        let options = settings(&self.prepared, &self.moving, self.options.steps);
+        FitOptions { weighting: self.options.weighting.clone(), gain: 1e-3, ..options }
+    }
+
     /// A point fitted with grids that move, plays and deadzones without use left out; and its cost.
     fn on_moving_grids(&self, point: Point, progress: Progress) -> Result<(Point, f64), Error> {
         const STILL: usize = 6;
         const STEPS: usize = 12;
-        let mut options = settings(&self.prepared, &self.moving, STEPS);
-        options.weighting = self.options.weighting.clone();
-        options.gain = 1e-3;
+        let mut options = FitOptions { steps: STEPS, ..self.moving_grids() };
         let record = &self.prepared.record;
         // new weights first: with all that moves at once, the kinks at which plays turn stop the fit early
         let still = FitOptions { steps: STILL, gain: 1e-3, ..self.options.clone() };

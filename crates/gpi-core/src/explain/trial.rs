@@ -3,9 +3,9 @@
 use super::ranking::Ranked;
 use super::score::Score;
 use super::search::Search;
-use crate::effects::Entry;
+use crate::effects::{Entry, Stage};
 use crate::identify::Progress;
-use crate::identify::levenberg_marquardt::{Fitted, fit};
+use crate::identify::levenberg_marquardt::{FitOptions, Fitted, Status, fit};
 use crate::identify::point::{Layout, Point};
 use crate::identify::refine::Refined;
 use crate::linear::Section;
@@ -54,9 +54,34 @@ impl Search<'_> {
     ) -> Result<Trial, Error> {
         let gain = score.gain;
         let start = self.start(&self.point, score)?;
+        let (fitted, options) = self.fitted(start, entry, progress)?;
+        self.judged(&self.point, entry, fitted, options, gain, progress)
+    }
+
+    /// A point with `entry` as its newest effect, fitted jointly, and what was free at last.
+    pub(super) fn fitted(
+        &self,
+        start: Point,
+        entry: &Entry,
+        progress: Progress,
+    ) -> Result<(Fitted, FitOptions), Error> {
+        /// Times that a fit goes on which is still on its way.
+        const MORE: usize = 3;
         let record = &self.prepared.record;
-        let fitted = fit(start, record, &self.options, entry.name, progress)?;
-        self.judged(&self.point, entry, fitted, gain, progress)
+        let mut options = self.options.clone();
+        let mut fitted = fit(start, record, &options, entry.name, progress)?;
+        if entry.stage == Stage::Plays {
+            // the grid has bent to what the plays lacked
+            options = self.moving_grids();
+            fitted = fit(fitted.point, record, &options, entry.name, progress)?;
+        }
+        for _ in 0..MORE {
+            if !is_on_its_way(&fitted) {
+                break;
+            }
+            fitted = fit(fitted.point, record, &options, entry.name, progress)?;
+        }
+        Ok((fitted, options))
     }
 
     /// Whether it is the input that makes the lags beside G explain what they do: those that begin in motion
@@ -103,20 +128,21 @@ impl Search<'_> {
         without: &Point,
         entry: &'static Entry,
         fitted: Fitted,
+        options: FitOptions,
         promised: f64,
         progress: Progress,
     ) -> Result<Trial, Error> {
         let (cost, values) = (fitted.linearization.cost, self.prepared.values());
         let point = fitted.point.clone();
-        let added = fitted.linearization.layout.len.saturating_sub(self.layout_len());
+        let length = |point: &Point| Layout::new(point, self.options.freedom).len;
+        let added = length(&point).saturating_sub(length(&self.point));
         /// Candidates that a round looks at: the best of so many must be better than one.
         const LOOKS: f64 = 150.0;
         let deviance = values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln();
         let white = added.max(1) as f64 * values.ln() + 2.0 * LOOKS.ln();
         let mut chance = white.max(LEAST * values);
         if deviance > chance {
-            let refined =
-                Refined { fitted, options: self.options.clone(), outliers: 0, robust: false };
+            let refined = Refined { fitted, options, outliers: 0, robust: false };
             let uncertainty = refined.uncertainty(&self.prepared, progress)?;
             let colour = uncertainty.used / uncertainty.estimated.max(1) as f64;
             chance = chance.max(colour * white);
@@ -124,10 +150,6 @@ impl Search<'_> {
         let held_out = self.held_out(&point)?;
         let is_driven = self.is_driven(without, &point)?;
         Ok(Trial { entry, point, cost, deviance, chance, held_out, promised, is_driven })
-    }
-
-    pub(super) fn layout_len(&self) -> usize {
-        Layout::new(&self.point, self.options.freedom).len
     }
 
     /// Sum of squares of what the training scores.
@@ -182,6 +204,17 @@ impl Search<'_> {
         }
         Rejected { effect: trial.entry.name, holdout_rms, why, confounded_with }
     }
+}
+
+/// Whether the last steps of a fit that had no more were long ones.
+fn is_on_its_way(fitted: &Fitted) -> bool {
+    const STEPS: usize = 4;
+    /// Of the squares, in so many steps.
+    const MUCH: f64 = 0.1;
+    let history = &fitted.history;
+    let before = history.len().checked_sub(STEPS + 1).map(|place| history[place]);
+    fitted.status == Status::Limit
+        && before.is_some_and(|before| fitted.linearization.cost < (1.0 - MUCH) * before)
 }
 
 /// Whether what is held out has become smaller by more than chance: in the mean of the blocks, or in

@@ -117,6 +117,13 @@ pub(crate) fn compare(
         };
         search.orders(&mut dynamics, progress)?;
     }
+    if options.order.is_none() && !search.has_usable() {
+        // Slower than the samples show anything fast: what is slow is looked for beside a gain.
+        let (points, _) = quasi_static::seeds(prepared, None, progress)?;
+        for point in &points {
+            search.climb(point, progress)?;
+        }
+    }
     let stages = (Some(seed.fir), seed.singular_values, seed.reflected, seed.rounds);
     compared(search, false, stages, supported)
 }

@@ -217,6 +217,11 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// Whether any candidate may be chosen.
+    pub(crate) fn has_usable(&self) -> bool {
+        self.refined.iter().any(|(refined, _)| self.is_usable(refined))
+    }
+
     fn is_usable(&self, refined: &Refined) -> bool {
         /// Of the record's length.
         const LONGEST_MEMORY: f64 = 0.05;
@@ -226,7 +231,7 @@ impl<'a> Search<'a> {
         let record = &self.prepared.record;
         let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
         let swings = LONGEST_MEMORY * longest as f64;
-        let lags = swings.min(crate::effects::SHORTEST_CREEP * record.rate());
+        let lags = swings.min(crate::effects::shortest_creep(record.rate()) * record.rate());
         refined.fitted.point.dynamics.poles().iter().all(|pole| {
             let memory = -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln();
             let is_lag = pole.im == 0.0 && pole.re > 0.0;
