@@ -117,7 +117,7 @@ pub(crate) fn compare(
         };
         search.orders(&mut dynamics, progress)?;
     }
-    if options.order.is_none() && !search.has_usable() {
+    if options.order.is_none() && search.shows_nothing_fast() {
         // Slower than the samples show anything fast: what is slow is looked for beside a gain.
         let (points, _) = quasi_static::seeds(prepared, None, progress)?;
         for point in &points {

@@ -7,8 +7,10 @@ use super::preparation::{Prepared, rescale};
 use super::refine::{RefineOptions, Refined, joint, settings};
 use super::sensitivity::Parameters;
 use super::{Grid, Progress};
+use crate::effects::shortest_creep;
 use crate::linear::Sections;
 use crate::{Error, Record};
+use std::f64::consts::PI;
 
 /// One structure that was refined and compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -217,9 +219,31 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether any candidate may be chosen.
-    pub(crate) fn has_usable(&self) -> bool {
-        self.refined.iter().any(|(refined, _)| self.is_usable(refined))
+    /// Whether slow poles rule out all candidates, and G of the best one is flat beyond them.
+    pub(crate) fn shows_nothing_fast(&self) -> bool {
+        const FREQUENCIES: usize = 32;
+        /// Largest over smallest gain.
+        const FLAT: f64 = 2.0;
+        if self.refined.iter().any(|(refined, _)| self.is_usable(refined)) {
+            return false;
+        }
+        let smallest =
+            |&i: &usize, &j: &usize| self.candidates[i].rms.total_cmp(&self.candidates[j].rms);
+        let Some(best) = (0..self.candidates.len()).min_by(smallest) else { return false };
+        let dynamics = &self.refined[best].0.fitted.point.dynamics;
+        // twice the corner of the longest lag that is dynamics
+        let lowest = (2.0 / self.longest_lag()).min(1.0);
+        let frequency = |i: usize| lowest * (PI / lowest).powf(i as f64 / FREQUENCIES as f64);
+        let gains = (0..FREQUENCIES).map(|i| dynamics.response(frequency(i)).norm());
+        let (low, high) = gains
+            .fold((f64::INFINITY, 0.0_f64), |(low, high), gain| (low.min(gain), high.max(gain)));
+        high < FLAT * low
+    }
+
+    /// Of which dynamics may have a memory, in samples: longer lags are creep.
+    fn longest_lag(&self) -> f64 {
+        let rate = self.prepared.record.rate();
+        shortest_creep(rate) * rate
     }
 
     fn is_usable(&self, refined: &Refined) -> bool {
@@ -231,7 +255,7 @@ impl<'a> Search<'a> {
         let record = &self.prepared.record;
         let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
         let swings = LONGEST_MEMORY * longest as f64;
-        let lags = swings.min(crate::effects::shortest_creep(record.rate()) * record.rate());
+        let lags = swings.min(self.longest_lag());
         refined.fitted.point.dynamics.poles().iter().all(|pole| {
             let memory = -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln();
             let is_lag = pole.im == 0.0 && pole.re > 0.0;
