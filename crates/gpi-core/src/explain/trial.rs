@@ -55,7 +55,15 @@ impl Search<'_> {
         let gain = score.gain;
         let start = self.start(&self.point, score)?;
         let (fitted, options) = self.fitted(start, entry, progress)?;
-        self.judged(&self.point, entry, fitted, options, gain, progress)
+        let trial = self.judged(&self.point, entry, fitted, options, gain, progress)?;
+        if entry.stage != Stage::Plays || trial.deviance <= trial.chance {
+            return Ok(trial);
+        }
+        // what the same fit gains without the effect is not the effect's
+        let (without, _) = self.fitted(self.point.clone(), entry, progress)?;
+        let gained = self.cost / without.linearization.cost.max(f64::MIN_POSITIVE);
+        let deviance = trial.deviance - self.prepared.values() * gained.ln().max(0.0);
+        Ok(Trial { deviance, ..trial })
     }
 
     /// A point with `entry` as its newest effect, fitted jointly, and what was free at last.
