@@ -17,10 +17,15 @@ pub struct Creep {
 }
 
 /// Shorter lags, in seconds, are dynamics; so are those that die out within a few samples.
-pub(crate) fn shortest(rate: f64) -> f64 {
+fn shortest(rate: f64) -> f64 {
     const SECONDS: f64 = 0.03;
     const SAMPLES: f64 = 5.0;
     SECONDS.max(SAMPLES / rate)
+}
+
+/// Time constant in samples up to which a lag may be dynamics: a slower one is creep.
+pub(crate) fn longest_lag(rate: f64) -> f64 {
+    shortest(rate) * rate
 }
 
 /// Longer ones are a drift in proportion to the integral of v.

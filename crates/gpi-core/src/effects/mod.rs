@@ -40,7 +40,7 @@ pub use periodic_disturbance::PeriodicDisturbance;
 pub use rate_dependence::{RateDependence, SpeedLaw};
 pub use stiffness::Stiffness;
 
-pub(crate) use creep::shortest as shortest_creep;
+pub(crate) use creep::longest_lag;
 pub(crate) use situation::{Candidate, Situation};
 
 /// Declares [`Effect`], one variant an effect, and [`CATALOGUE`].

@@ -1,7 +1,7 @@
 //! Creep that hides in G: slow poles that came when something else was fitted.
 
 use super::search::Search;
-use crate::effects::shortest_creep;
+use crate::effects::longest_lag;
 use crate::identify::Progress;
 use crate::identify::levenberg_marquardt::fit;
 use crate::identify::point::Point;
@@ -54,7 +54,7 @@ impl Search<'_> {
 
 /// The point without the slow lags of G; `None` where it has none, or nothing else.
 fn without_lags(point: &Point, record: &Record) -> Result<Option<Point>, Error> {
-    let longest = shortest_creep(record.rate()) * record.rate();
+    let longest = longest_lag(record.rate());
     let slow = |pole: &nalgebra::Complex<f64>| {
         pole.im == 0.0 && pole.re > 0.0 && -1.0 / pole.re.ln() > longest
     };

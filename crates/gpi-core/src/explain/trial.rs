@@ -20,7 +20,8 @@ pub(crate) struct Trial {
     pub entry: &'static Entry,
     pub point: Point,
     pub cost: f64,
-    /// `N ln(cost before / cost after)`.
+    /// `N ln(cost before / cost after)`, less what the same fit gains without the effect where that moves
+    /// more than the base model's did.
     pub deviance: f64,
     /// What chance alone would give at most, with the colour of the residual that is left.
     pub chance: f64,

@@ -7,7 +7,7 @@ use super::preparation::{Prepared, rescale};
 use super::refine::{RefineOptions, Refined, joint, settings};
 use super::sensitivity::Parameters;
 use super::{Grid, Progress};
-use crate::effects::shortest_creep;
+use crate::effects::longest_lag;
 use crate::linear::Sections;
 use crate::{Error, Record};
 use std::f64::consts::PI;
@@ -232,18 +232,12 @@ impl<'a> Search<'a> {
         let Some(best) = (0..self.candidates.len()).min_by(smallest) else { return false };
         let dynamics = &self.refined[best].0.fitted.point.dynamics;
         // twice the corner of the longest lag that is dynamics
-        let lowest = (2.0 / self.longest_lag()).min(1.0);
+        let lowest = (2.0 / longest_lag(self.prepared.record.rate())).min(1.0);
         let frequency = |i: usize| lowest * (PI / lowest).powf(i as f64 / FREQUENCIES as f64);
         let gains = (0..FREQUENCIES).map(|i| dynamics.response(frequency(i)).norm());
         let (low, high) = gains
             .fold((f64::INFINITY, 0.0_f64), |(low, high), gain| (low.min(gain), high.max(gain)));
         high < FLAT * low
-    }
-
-    /// Of which dynamics may have a memory, in samples: longer lags are creep.
-    fn longest_lag(&self) -> f64 {
-        let rate = self.prepared.record.rate();
-        shortest_creep(rate) * rate
     }
 
     fn is_usable(&self, refined: &Refined) -> bool {
@@ -255,7 +249,7 @@ impl<'a> Search<'a> {
         let record = &self.prepared.record;
         let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
         let swings = LONGEST_MEMORY * longest as f64;
-        let lags = swings.min(self.longest_lag());
+        let lags = swings.min(longest_lag(record.rate()));
         refined.fitted.point.dynamics.poles().iter().all(|pole| {
             let memory = -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln();
             let is_lag = pole.im == 0.0 && pole.re > 0.0;
