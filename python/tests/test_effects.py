@@ -166,6 +166,13 @@ def parabola(t, values):
 
 
 LAW = {"exponent": 0.3, "knee": 40.0, "lag": 4e-3}
+
+
+def power_loop(exponent, drives):
+    law = {"power": {"exponent": exponent, "scale": 2.0}}
+    return {"sees": {"output": 0}, "law": law, "drives": list(drives)}
+
+
 DRIVES2, DRIVES3 = np.array([0.002, -0.001, 0.003]), np.array([-0.004, 0.002, 0.001])
 CURVES = np.array([[0.02, -0.1, 0.05, 0.01], [0.03, 0.02, -0.04, 0.02]])
 
@@ -207,7 +214,7 @@ CASES = {
         {"beside": lambda v: 0.1 * lag(v, 0.1) + 0.3 * lag(v, 2.0)},
     ),
     "stiffness": (
-        {"output": 0, "drives": [*DRIVES2, *DRIVES3], "scale": 2.0},
+        {"loops": [power_loop(2, DRIVES2), power_loop(3, DRIVES3)]},
         {"feedback": lambda y: 2 * (DRIVES2 * (y / 2) ** 2 + DRIVES3 * (y / 2) ** 3)},
     ),
     "output-nonlinearity": (
@@ -365,7 +372,7 @@ def test_a_slower_amplifier_never_overshoots(seed, limit):
     ("effect", "message"),
     [
         ({"name": "backlash", "output": 1, "half_width": 0.1}, "channel 1 of 1"),
-        ({"name": "stiffness", "output": 0, "drives": [0.0] * 20, "scale": 1.0}, "drives 10 states"),
+        ({"name": "stiffness", "loops": [power_loop(3, [0.0] * 20)]}, "drives 20 states"),
         (
             {
                 "name": "hysteresis-shape",

@@ -1,6 +1,6 @@
 //! A model's chain with its effects, a block of samples at a time.
 
-use crate::effects::{Block, Effect, Moment, Quantity, Stage, Units};
+use crate::effects::{Block, Effect, InnerLoop, Moment, Quantity, Stage, Units};
 use crate::linear::advance;
 use crate::model::{Model, ModelState};
 use crate::operators::{GpiState, Operator, play};
@@ -64,16 +64,17 @@ impl Model {
                 let what = format!("acts on channel {} of {channels}", block.channel());
                 return Err(requirement(what));
             }
+            for inner in block.loops() {
+                let (states, inputs) = (self.linear().order(), self.inputs().len());
+                if let Some(flaw) = inner.flaw(states, inputs, self.outputs().len()) {
+                    return Err(requirement(flaw));
+                }
+            }
             if block.values().iter().any(|value| !value.is_finite()) {
                 return Err(requirement("its values must be finite".to_owned()));
             }
             if let Some(flaw) = block.flaw() {
                 return Err(requirement(flaw));
-            }
-            let (drives, states) = (block.feedback(0.0).len(), self.linear().order());
-            if drives > states {
-                let what = format!("drives {drives} states, but the dynamics have {states}");
-                return Err(requirement(what));
             }
         }
         Ok(())
@@ -180,12 +181,8 @@ impl Model {
 
     /// G and what stands beside it and in its loop.
     pub(crate) fn respond_from(&self, state: &mut ModelState, v: &Matrix) -> Result<Matrix, Error> {
-        let loops: Vec<&dyn Block> = self
-            .effects
-            .iter()
-            .map(Effect::block)
-            .filter(|block| !block.feedback(0.0).is_empty())
-            .collect();
+        let blocks = self.effects.iter().map(Effect::block);
+        let loops: Vec<&InnerLoop> = blocks.flat_map(Block::loops).collect();
         let linear = self.linear();
         let mut output = if loops.is_empty() {
             linear.simulate_from(&mut state.linear, v)?
@@ -202,20 +199,43 @@ impl Model {
             }
         }
         if !loops.is_empty() {
-            for k in 0..v.nrows() {
-                let own = linear.step(&mut state.linear, &v.row(k).transpose());
-                let mut row = output.row_mut(k);
-                row += own.transpose();
-                for block in &loops {
-                    let drives = block.feedback(row[block.channel()]);
-                    let first = linear.order() - drives.len();
-                    for (place, (drive, _)) in drives.into_iter().enumerate() {
-                        state.linear[first + place] += drive;
-                    }
-                }
-            }
+            self.circulate(state, v, &mut output);
         }
         Ok(output)
+    }
+
+    /// Adds what G makes of v with its loops closed.
+    fn circulate(&self, state: &mut ModelState, v: &Matrix, output: &mut Matrix) {
+        let linear = self.linear();
+        let blocks = self.effects.iter().map(Effect::block).zip(&mut state.effects);
+        let mut loops: Vec<(&InnerLoop, &mut [f64])> = Vec::new();
+        for (block, memory) in blocks.filter(|(block, _)| !block.loops().is_empty()) {
+            memory.resize(block.loops().iter().map(|inner| inner.law.stops()).sum(), 0.0);
+            let mut rest = &mut memory[..];
+            for inner in block.loops() {
+                let (own, others) = rest.split_at_mut(inner.law.stops());
+                loops.push((inner, own));
+                rest = others;
+            }
+        }
+        let mut drive = vec![0.0; linear.order()];
+        for k in 0..v.nrows() {
+            let now = v.row(k).transpose();
+            let before = state.linear.clone();
+            let own = linear.step(&mut state.linear, &now);
+            let displacement = output.row(k).transpose() + own;
+            output.set_row(k, &displacement.transpose());
+            drive.fill(0.0);
+            for (inner, places) in &mut loops {
+                let z =
+                    inner.sees.signal(before.as_slice(), now.as_slice(), displacement.as_slice());
+                let w = inner.law.step(places, z, &mut vec![0.0; inner.law.marks()]);
+                let first = linear.order() - inner.drives.len();
+                let driven = drive[first..].iter_mut().zip(&inner.drives);
+                driven.for_each(|(sum, drive)| *sum += drive * w);
+            }
+            state.linear.iter_mut().zip(&drive).for_each(|(x, drive)| *x += drive);
+        }
     }
 
     /// The output stage, and what is added before and behind it.

@@ -1,6 +1,6 @@
 //! What an effect can do.
 
-use super::Effect;
+use super::{Effect, InnerLoop};
 
 /// Where an effect stands in the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -195,11 +195,14 @@ pub trait Block {
         (f64::NEG_INFINITY, f64::INFINITY)
     }
 
-    /// Dynamics: what the displacement drives each state of G with, `(drive, slope)` pairs by state;
-    /// empty where nothing is fed back.
-    fn feedback(&self, displacement: f64) -> Vec<(f64, f64)> {
-        let _ = displacement;
-        Vec::new()
+    /// Dynamics: loops that are closed around G. Their values come first, see [`InnerLoop`].
+    fn loops(&self) -> &[InnerLoop] {
+        &[]
+    }
+
+    /// The same, to be changed.
+    fn loops_mut(&mut self) -> &mut [InnerLoop] {
+        &mut []
     }
 
     /// Output stage: what the sensor shows, and how changes pass.

@@ -4,7 +4,7 @@ use crate::effects::{Candidate, Effect, Situation, Stage};
 use crate::identify::free_run::Signals;
 use crate::identify::linearization::{Linearization, Weighting, gather};
 use crate::identify::point::{Freedom, Point};
-use crate::identify::stream::Stream;
+use crate::identify::stream::{Rows, Stream};
 use crate::identify::uncertainty::descending_eigen;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::DVector;
@@ -202,7 +202,7 @@ impl<'a> Base<'a> {
             let derivatives = self.freedom.derivatives;
             let layout = &self.linearization.layout;
             let stream = Stream::new(self.point, layout, derivatives, experiment, index)?;
-            gather(stream, &mut || Ok(()), |regressors, residuals| {
+            gather(stream, &mut || Ok(()), |Rows { regressors, residuals }| {
                 let count = residuals.ncols();
                 let places = &places[first..first + count];
                 for (output, regressor) in regressors.iter().enumerate() {

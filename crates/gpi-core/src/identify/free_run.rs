@@ -1,9 +1,10 @@
 //! A point run free over the record, stage by stage, and the model that it is.
 
+use super::motion::Motion;
 use super::point::{Past, Point};
 use super::sensitivity::{Beside, Parameters};
 use super::stream::hats;
-use crate::effects::{Block, Effect, Moment, Slope, Stage};
+use crate::effects::{Block, Effect, InnerLoop, Moment, Stage};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::{DVector, RowDVector};
@@ -59,48 +60,47 @@ impl Point {
         experiment: &Experiment,
         past: &Past,
     ) -> Result<Matrix, Error> {
-        let Sections { delay, sections, d, .. } = &self.dynamics;
-        let loops: Vec<_> = self.loops().collect();
-        let outputs = d.nrows();
-        let mut displacement = Matrix::zeros(v.nrows(), outputs);
-        // before the record the intermediate signals stood
-        let first = v.row(0).transpose();
-        let standing = sections.iter().map(|section| section.standing(&section.b) * &first);
-        let mut state: Vec<f64> =
-            standing.flat_map(|states| states.data.as_vec().clone()).collect();
-        let mut now = DVector::zeros(v.ncols());
+        let mut displacement = Matrix::zeros(v.nrows(), self.dynamics.outputs());
+        let mut motion = Motion::new(self);
+        let mut now: Vec<f64> = v.row(0).iter().copied().collect();
+        motion.stand(&now);
         for k in 0..v.nrows() {
             if k == experiment.warmup && past.moving {
-                state.iter_mut().zip(past.state.iter()).for_each(|(state, own)| *state += own);
+                motion.state.iter_mut().zip(past.state.iter()).for_each(|(x, own)| *x += own);
             }
-            now.tr_copy_from(&v.row(k.saturating_sub(*delay)));
-            for output in 0..outputs {
-                displacement[(k, output)] = d.row(output).tr_dot(&now);
+            let at = k.saturating_sub(self.dynamics.delay);
+            now.iter_mut().zip(v.row(at).iter()).for_each(|(now, v)| *now = *v);
+            motion.observe(&now);
+            for (output, y) in motion.displacement.iter().enumerate() {
+                displacement[(k, output)] = *y;
             }
-            let mut rest = &mut state[..];
-            for section in sections {
-                let (own, others) = rest.split_at_mut(section.order());
-                for output in 0..outputs {
-                    let c = section.c.row(output);
-                    displacement[(k, output)] +=
-                        own.iter().zip(c.iter()).map(|(x, c)| x * c).sum::<f64>();
-                }
-                section.advance(own, now.as_slice());
-                rest = others;
-            }
-            for effect in &loops {
-                let drives = effect.block().feedback(displacement[(k, effect.block().channel())]);
-                for (state, (drive, _)) in state.iter_mut().zip(drives) {
-                    *state += drive;
-                }
-            }
+            motion.advance(&now);
         }
         Ok(displacement)
     }
 
-    /// Effects that feed the displacement back.
-    pub(crate) fn loops(&self) -> impl Iterator<Item = &Effect> {
-        self.at_stage(Stage::Dynamics).filter(|effect| !effect.block().feedback(0.0).is_empty())
+    /// The loops that effects close around G.
+    pub(crate) fn loops(&self) -> impl Iterator<Item = &InnerLoop> {
+        self.at_stage(Stage::Dynamics).flat_map(|effect| effect.block().loops())
+    }
+
+    /// Effects that read the plays.
+    pub(crate) fn readers(&self) -> impl Iterator<Item = &Effect> {
+        self.effects.iter().filter(|effect| effect.block().reads())
+    }
+
+    /// Derivatives of v by the values of each effect that reads the plays, (values, samples).
+    pub(crate) fn reading_slopes(&self, drive: &Matrix, past: &Past) -> Vec<Matrix> {
+        let of = |effect: &Effect| self.reading_slopes_of(effect.block(), drive, past);
+        self.readers().map(of).collect()
+    }
+
+    /// The same of one effect.
+    fn reading_slopes_of(&self, block: &dyn Block, drive: &Matrix, past: &Past) -> Matrix {
+        let input = block.channel();
+        let start = past.plays.as_ref().map(|plays| &plays[input][..]);
+        let drive: Vec<f64> = drive.column(input).iter().copied().collect();
+        self.channels[input].reading_slopes(start, self.beside(input), &drive, block)
     }
 
     /// Takes a displacement (samples, outputs) through the output stage.
@@ -200,21 +200,26 @@ impl Point {
         Ok(output)
     }
 
-    /// Derivatives of the output by the values of every effect that is not a section: `[effect][value]`,
+    /// Derivatives of the output by the values of every effect whose own do not stream along: `[effect][value]`,
     /// (samples, outputs), from differences.
     pub(crate) fn effect_columns(
         &self,
         experiment: &Experiment,
         index: usize,
     ) -> Result<Vec<Vec<Matrix>>, Error> {
-        if self.effects.is_empty() {
-            return Ok(Vec::new());
+        let streams = |block: &dyn Block| block.reads() || !block.loops().is_empty();
+        if self.effects.iter().all(|effect| streams(effect.block())) {
+            return Ok(vec![Vec::new(); self.effects.len()]);
         }
         let known = self.signals(experiment, index)?;
         let here = self.output_from(Stage::Added, &known, experiment, index)?;
-        (0..self.effects.len())
-            .map(|place| self.columns_of(place, &known, &here, experiment, index))
-            .collect()
+        let of = |(place, effect): (usize, &Effect)| {
+            if streams(effect.block()) {
+                return Ok(Vec::new());
+            }
+            self.columns_of(place, &known, &here, experiment, index)
+        };
+        self.effects.iter().enumerate().map(of).collect()
     }
 
     /// The same of one effect; `here` is the output.
@@ -233,11 +238,7 @@ impl Point {
         let steps = block.steps();
         if block.reads() {
             let input = block.channel();
-            let past = self.pasts[index].plays.as_ref();
-            let start = past.map(|plays| &plays[input][..]);
-            let drive: Vec<f64> = known.drive.column(input).iter().copied().collect();
-            let channel = &self.channels[input];
-            let slopes = channel.reading_slopes(start, self.beside(input), &drive, block);
+            let slopes = self.reading_slopes_of(block, &known.drive, &self.pasts[index]);
             let column = |(step, slope): (f64, nalgebra::RowDVector<f64>)| {
                 let mut moved = known.clone();
                 moved.intermediate.column_mut(input).axpy(step, &slope.transpose(), 1.0);
@@ -326,41 +327,4 @@ pub(crate) struct Signals {
     pub intermediate: Matrix,
     /// What the dynamics make of it.
     pub displacement: Matrix,
-}
-
-/// The output stage of one output, with the changes that pass through it.
-pub(crate) struct Sensing<'a> {
-    blocks: Vec<(&'a Effect, Vec<f64>, Vec<f64>)>,
-}
-
-impl<'a> Sensing<'a> {
-    /// The output stood at `first`; `unknowns` changes pass.
-    pub(crate) fn new(point: &'a Point, output: usize, first: f64, unknowns: usize) -> Self {
-        let own = point.at_stage(Stage::Output).filter(|e| e.block().channel() == output);
-        let mut value = first;
-        let blocks = own.map(|effect| {
-            let moment = point.moment(0, &[]);
-            let state = effect.block().rest(value, moment);
-            value = effect.block().sense(&mut state.clone(), value, moment).0;
-            (effect, state, vec![0.0; unknowns])
-        });
-        Self { blocks: blocks.collect() }
-    }
-
-    /// Takes one sample through, and the row of its derivatives.
-    pub(crate) fn step(&mut self, output: f64, row: Option<&mut [f64]>, moment: Moment) -> f64 {
-        let mut value = output;
-        let mut row = row;
-        for (effect, state, held) in &mut self.blocks {
-            let (sensed, slope) = effect.block().sense(state, value, moment);
-            value = sensed;
-            let Some(row) = row.as_deref_mut() else { continue };
-            match slope {
-                Slope::Times(factor) => row.iter_mut().for_each(|value| *value *= factor),
-                Slope::Held => row.copy_from_slice(held),
-            }
-            held.copy_from_slice(row);
-        }
-        value
-    }
 }

@@ -73,13 +73,13 @@ pub(crate) fn fit(
     progress: Progress,
 ) -> Result<Fitted, Error> {
     const LARGEST_DAMPING: f64 = 1e6;
-    let mut linearize = |point: &Point, step: usize| {
+    let linearize = |point: &Point, step: usize, progress: Progress| {
         let done = step as f64 / options.steps as f64;
         let mut check = || report(progress, stage, done);
         Linearization::new(point, record, options.freedom, &options.weighting, &mut check)
     };
     let mut point = point;
-    let mut current = linearize(&point, 0)?;
+    let mut current = linearize(&point, 0, progress)?;
     let mut history = vec![current.cost];
     let (mut damping, mut growth) = (1e-4_f64, 2.0);
     let mut status = Status::Limit;
@@ -103,8 +103,10 @@ pub(crate) fn fit(
             break;
         }
         let trial = point.moved(&change, layout);
-        let linearization = linearize(&trial, step)?;
-        if linearization.cost < current.cost {
+        // a step that leads nowhere need not be linearized
+        report(progress, stage, step as f64 / options.steps as f64)?;
+        if options.weighting.cost(&trial.residuals(record)?, record) < current.cost {
+            let linearization = linearize(&trial, step, progress)?;
             let gained = current.cost - linearization.cost;
             let small =
                 gained < options.gain * current.cost && predicted < options.gain * current.cost;

@@ -1,7 +1,7 @@
 //! The model linearized around a point, gathered into normal equations.
 
 use super::point::{Freedom, Layout, Point};
-use super::stream::Stream;
+use super::stream::{Rows, Stream};
 use crate::linear::NormalEquations;
 use crate::{Error, Matrix, Record};
 use nalgebra::DVector;
@@ -36,6 +36,19 @@ impl Weighting {
 }
 
 impl Weighting {
+    /// The sum of the losses of residuals (samples, outputs) of each experiment.
+    pub(crate) fn cost(&self, residuals: &[Matrix], record: &Record) -> f64 {
+        let runs = residuals.iter().zip(record.experiments());
+        let scored = runs.flat_map(|(residual, experiment)| experiment.scored_rows(residual));
+        let losses = scored.map(|rows| {
+            let outputs = rows.column_iter().enumerate();
+            outputs
+                .map(|(output, column)| column.iter().map(|&e| self.of(output, e).1).sum::<f64>())
+                .sum::<f64>()
+        });
+        losses.sum()
+    }
+
     /// Mean second derivative of the loss over the mean weight of the reweighted squares, which stand
     /// in for it in the normal equations: 1 for least squares.
     pub(crate) fn curvature(&self, residuals: &[Matrix], record: &Record) -> f64 {
@@ -86,7 +99,7 @@ impl Linearization {
         for (index, experiment) in record.experiments().iter().enumerate() {
             check()?;
             let stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
-            gather(stream, check, |rows, residuals| gathered.add(rows, &residuals, weighting))?;
+            gather(stream, check, |rows| gathered.add(rows, weighting))?;
         }
         Ok(Self { equations: gathered.equations, cost: gathered.cost, layout })
     }
@@ -102,22 +115,19 @@ impl Linearization {
     }
 }
 
-/// Streams an experiment on this thread and gathers its blocks of rows on another one: regressors
-/// (unknowns, samples) of every output, and residuals (outputs, samples).
+/// Streams an experiment on this thread and gathers its blocks of rows on another one.
 pub(crate) fn gather(
     mut stream: Stream,
     check: &mut dyn FnMut() -> Result<(), Error>,
-    mut add: impl FnMut(Vec<Matrix>, Matrix) + Send,
+    mut add: impl FnMut(Rows) + Send,
 ) -> Result<(), Error> {
     std::thread::scope(|scope| {
-        let (send, receive) = sync_channel::<(Vec<Matrix>, Matrix)>(2);
-        let gathering = scope.spawn(move || {
-            receive.iter().for_each(|(rows, residuals)| add(rows, residuals));
-        });
+        let (send, receive) = sync_channel::<Rows>(4);
+        let gathering = scope.spawn(move || receive.iter().for_each(&mut add));
         let streamed = stream.run(&mut |rows| {
             check()?;
             // only a panic ends the other thread early, and joining it tells
-            let _ = send.send((rows.regressors.to_vec(), rows.residuals.clone()));
+            let _ = send.send(rows);
             Ok(())
         });
         drop(send);
@@ -137,10 +147,10 @@ impl Gathered {
         Self { equations: NormalEquations::zeros(unknowns, 1), cost: 0.0 }
     }
 
-    /// Adds a block: regressors (unknowns, samples) of every output, and residuals (outputs, samples).
-    fn add(&mut self, regressors: Vec<Matrix>, residuals: &Matrix, weighting: &Weighting) {
-        for (output, mut regressor) in regressors.into_iter().enumerate() {
-            let mut target = residuals.row(output).into_owned();
+    /// Adds a block.
+    fn add(&mut self, rows: Rows, weighting: &Weighting) {
+        for (output, mut regressor) in rows.regressors.into_iter().enumerate() {
+            let mut target = rows.residuals.row(output).into_owned();
             for (mut row, value) in regressor.column_iter_mut().zip(target.iter_mut()) {
                 let (weight, loss) = weighting.of(output, *value);
                 self.cost += loss;

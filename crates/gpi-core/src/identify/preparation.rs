@@ -2,8 +2,10 @@
 
 use super::Grid;
 use super::hysteresis::forgets_at;
+use super::inner_loops::sections_of;
 use super::point::{Past, Point};
 use super::sensitivity::Parameters;
+use crate::effects::{Block, Effect, Sees};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::DVector;
@@ -105,9 +107,9 @@ impl<'a> Prepared<'a> {
 
     /// The dynamics and effects of a model behind the prepared hysteresis, the gain in the plays.
     pub(crate) fn point_of(&self, model: &Model) -> Result<Point, Error> {
-        let point = self.point(Sections::from_delayed_state_space(model.linear())?);
-        let effects = model.effects().iter().cloned();
-        let mut point = effects.fold(point, |point, effect| point.with_effect(effect));
+        let (dynamics, effects) = sections_of(model)?;
+        let point = self.point(dynamics);
+        let mut point = effects.into_iter().fold(point, |point, effect| point.with_effect(effect));
         rescale(&mut point);
         Ok(point)
     }
@@ -192,7 +194,14 @@ pub(crate) fn starts_at_rest(experiment: &Experiment) -> bool {
 
 /// Moves the gain of G into the play weights.
 pub(crate) fn rescale(point: &mut Point) {
-    for (channel, gain) in point.channels.iter_mut().zip(point.dynamics.normalize_gain()) {
+    let gains = point.dynamics.normalize_gain();
+    for (channel, gain) in point.channels.iter_mut().zip(&gains) {
         channel.weights.iter_mut().for_each(|weight| *weight *= gain);
+    }
+    let blocks = point.effects.iter_mut().map(Effect::block_mut);
+    for inner in blocks.flat_map(Block::loops_mut) {
+        if let Sees::Mixture { inputs, .. } = &mut inner.sees {
+            inputs.iter_mut().zip(&gains).for_each(|(seen, gain)| *seen /= gain);
+        }
     }
 }

@@ -2,6 +2,8 @@
 
 use super::decompose::symmetric_eigen;
 use crate::{Error, Matrix};
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DVector;
 
 /// Normal equations `gram x = rhs` of a least squares problem, gathered without its regressor.
@@ -37,8 +39,7 @@ impl NormalEquations {
 
     /// Adds a block of equations: `regressor` is (unknowns, rows), `targets` (targets, rows).
     pub(crate) fn add(&mut self, regressor: &Matrix, targets: &Matrix) {
-        let transposed = regressor.transpose();
-        self.gram.gemm(1.0, regressor, &transposed, 1.0);
+        add_squares(&mut self.gram, regressor);
         self.rhs.gemm(1.0, regressor, &targets.transpose(), 1.0);
         for (sum, row) in self.squares.iter_mut().zip(targets.row_iter()) {
             *sum += row.norm_squared();
@@ -72,6 +73,24 @@ impl NormalEquations {
             (self.squares[target] - 2.0 * x.dot(&self.rhs.column(target)) + fitted).max(0.0)
         })
     }
+}
+
+/// Adds `factor factor^T`: half of it by products, the other half by symmetry.
+fn add_squares(gram: &mut Matrix, factor: &Matrix) {
+    let (unknowns, rows) = factor.shape();
+    let view = MatRef::from_column_major_slice(factor.as_slice(), unknowns, rows);
+    triangular::matmul(
+        MatMut::from_column_major_slice_mut(gram.as_mut_slice(), unknowns, unknowns),
+        BlockStructure::TriangularLower,
+        Accum::Add,
+        view,
+        BlockStructure::Rectangular,
+        view.transpose(),
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+    gram.fill_upper_triangle_with_lower_triangle();
 }
 
 /// Minimises `x^T gram x - 2 x^T rhs` over `lower <= x <= upper`, which contain zero (active set method

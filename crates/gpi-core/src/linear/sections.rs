@@ -74,12 +74,6 @@ impl Section {
         states
     }
 
-    /// Moves the state on by one sample of what drives the inputs.
-    pub(crate) fn advance(&self, state: &mut [f64], drive: &[f64]) {
-        let driven = |j| drive.iter().enumerate().map(|(i, v)| self.b[(j, i)] * v).sum();
-        advance(&self.a, state, driven);
-    }
-
     /// Whether all poles lie inside a circle slightly smaller than the unit circle.
     pub(crate) fn is_stable(&self) -> bool {
         /// Poles beyond have a memory of more than 10^7 samples.
@@ -101,11 +95,16 @@ impl Section {
     }
 
     /// The section with poles `poles` and residues `seen` (outputs, poles) times `driven` (poles,
-    /// inputs).
-    fn from_poles(poles: &[Complex64], seen: &ComplexMatrix, driven: &ComplexMatrix) -> Self {
+    /// inputs); the first `references` outputs may fix the states' scale.
+    fn from_poles(
+        poles: &[Complex64],
+        seen: &ComplexMatrix,
+        driven: &ComplexMatrix,
+        references: usize,
+    ) -> Self {
         let (outputs, order) = seen.shape();
         let size = |output: usize| seen.row(output).iter().map(|c| c.norm()).product::<f64>();
-        let reference = (0..outputs).max_by(|&i, &j| size(i).total_cmp(&size(j))).unwrap_or(0);
+        let reference = (0..references).max_by(|&i, &j| size(i).total_cmp(&size(j))).unwrap_or(0);
         let real = |matrix: ComplexMatrix| matrix.map(|value| value.re);
         if let [pole] = *poles {
             let scale = seen[(reference, 0)];
@@ -156,22 +155,35 @@ impl Sections {
 
     /// The sections of a state space, after `delay` samples that it does not contain.
     pub(crate) fn from_state_space(system: &StateSpace, delay: usize) -> Result<Self, Error> {
-        let (poles, vectors) = eigen_of(system)?;
-        let complex = |matrix: &Matrix| matrix.map(|value| Complex64::new(value, 0.0));
-        let seen = complex(system.c()) * &vectors;
-        let driven = solve(vectors, &complex(system.b()))
-            .unwrap_or_else(|| ComplexMatrix::zeros(system.order(), system.inputs()));
-        let section = |members: Vec<usize>| {
-            let poles: Vec<Complex64> = members.iter().map(|&i| poles[i]).collect();
-            Section::from_poles(
-                &poles,
-                &seen.select_columns(&members),
-                &driven.select_rows(&members),
-            )
-        };
-        let sections = group(&poles).into_iter().map(section).collect();
         let held = vec![(0, 0.0); system.inputs()];
+        let sections = sections_of(system, system.outputs())?;
         Ok(Self { delay, sections, d: system.d().clone(), held }.holding_present_gain())
+    }
+
+    /// The same of the first `inputs` and `outputs` of a state space. The others are what loops around it
+    /// drive and see: returned are the columns of B (order, loops) and the rows of C (loops, order) that are
+    /// theirs, in the coordinates of the sections.
+    pub(crate) fn with_loops(
+        system: &StateSpace,
+        delay: usize,
+        (inputs, outputs): (usize, usize),
+    ) -> Result<(Self, Matrix, Matrix), Error> {
+        let mut sections = sections_of(system, outputs)?;
+        let (drives, seen) = (system.inputs() - inputs, system.outputs() - outputs);
+        let mut e = Matrix::zeros(system.order(), drives);
+        let mut s = Matrix::zeros(seen, system.order());
+        let mut first = 0;
+        for section in &mut sections {
+            let order = section.order();
+            e.rows_mut(first, order).copy_from(&section.b.columns(inputs, drives));
+            s.columns_mut(first, order).copy_from(&section.c.rows(outputs, seen));
+            section.b = section.b.columns(0, inputs).into_owned();
+            section.c = section.c.rows(0, outputs).into_owned();
+            first += order;
+        }
+        let d = system.d().view((0, 0), (outputs, inputs)).into_owned();
+        let held = vec![(0, 0.0); inputs];
+        Ok((Self { delay, sections, d, held }.holding_present_gain(), e, s))
     }
 
     /// The sections of a state space, its leading samples without response counted as the delay.
@@ -324,6 +336,21 @@ impl Sections {
         }
         StateSpace::new(a, b, c, &self.d * chain.d())
     }
+}
+
+/// The sections of a state space; the first `references` outputs may fix their states' scales.
+fn sections_of(system: &StateSpace, references: usize) -> Result<Vec<Section>, Error> {
+    let (poles, vectors) = eigen_of(system)?;
+    let complex = |matrix: &Matrix| matrix.map(|value| Complex64::new(value, 0.0));
+    let seen = complex(system.c()) * &vectors;
+    let driven = solve(vectors, &complex(system.b()))
+        .unwrap_or_else(|| ComplexMatrix::zeros(system.order(), system.inputs()));
+    let section = |members: Vec<usize>| {
+        let poles: Vec<Complex64> = members.iter().map(|&i| poles[i]).collect();
+        let (seen, driven) = (seen.select_columns(&members), driven.select_rows(&members));
+        Section::from_poles(&poles, &seen, &driven, references)
+    };
+    Ok(group(&poles).into_iter().map(section).collect())
 }
 
 fn eigen_of(system: &StateSpace) -> Result<(DVector<Complex64>, ComplexMatrix), Error> {

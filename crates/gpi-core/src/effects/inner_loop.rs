@@ -1,0 +1,144 @@
+//! A loop that is closed around the linear dynamics.
+
+use crate::operators::play;
+
+/// `w = law(z)`, and `w(k)` drives the states of G for sample k + 1: `x+ = A x + B v + E w`.
+///
+/// No loop is algebraic, because w acts a sample later. With [`Law::Stops`] w is bounded, so that a stable
+/// G stays bounded whatever the loop's gain.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct InnerLoop {
+    /// What z is.
+    pub sees: Sees,
+    /// From z to w.
+    pub law: Law,
+    /// A column of E, by the states of G; those of its dead time, which come first, are not driven.
+    pub drives: Vec<f64>,
+}
+
+/// The signal that goes around a loop.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sees {
+    /// z is this output's displacement.
+    Output(usize),
+    /// `z = S x + T v`.
+    Mixture {
+        /// A row of S, by the states of G; those of its dead time are not seen.
+        states: Vec<f64>,
+        /// A row of T, by the inputs of G as they come out of its dead time.
+        inputs: Vec<f64>,
+    },
+}
+
+/// What a loop makes of its signal.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Law {
+    /// `w = (z/scale)^exponent scale`.
+    Power {
+        /// 2, 3, ..
+        exponent: i32,
+        /// In the unit of z.
+        scale: f64,
+    },
+    /// `w = sum_i g_i (z - F_{r_i}(z))`: stops, the elastic part of what plays F leave (Prandtl's model).
+    Stops {
+        /// r_i, in the unit of z.
+        half_widths: Vec<f64>,
+        /// g_i; the last one is 1 and fixes the scale of w.
+        weights: Vec<f64>,
+    },
+}
+
+impl Law {
+    /// How many plays it remembers.
+    pub(crate) fn stops(&self) -> usize {
+        match self {
+            Self::Power { .. } => 0,
+            Self::Stops { half_widths, .. } => half_widths.len(),
+        }
+    }
+
+    /// w. `places` are those of the plays, and `marks` tell how changes of z pass: the slope of a power,
+    /// or for each stop where its play slides to, 0 where it sticks.
+    pub(crate) fn step(&self, places: &mut [f64], z: f64, marks: &mut [f64]) -> f64 {
+        match self {
+            Self::Power { exponent, scale } => {
+                let relative = z / scale;
+                marks[0] = f64::from(*exponent) * relative.powi(exponent - 1);
+                relative.powi(*exponent) * scale
+            }
+            Self::Stops { half_widths, weights } => {
+                let mut w = 0.0;
+                let stops = half_widths.iter().zip(weights).zip(places).zip(marks);
+                for (((&r, weight), place), mark) in stops {
+                    let before = std::mem::replace(place, play(r, z, *place));
+                    *mark = if *place == before { 0.0 } else { (*place - before).signum() };
+                    w += weight * (z - *place);
+                }
+                w
+            }
+        }
+    }
+
+    /// How many marks [`Law::step`] leaves.
+    pub(crate) fn marks(&self) -> usize {
+        self.stops().max(1)
+    }
+}
+
+impl Sees {
+    /// z at a state of G and its dead time, v and the displacement of all outputs.
+    pub(crate) fn signal(&self, state: &[f64], v: &[f64], displacement: &[f64]) -> f64 {
+        match self {
+            Self::Output(output) => displacement[*output],
+            Self::Mixture { states, inputs } => {
+                let (late, own) = state.split_at(state.len() - states.len());
+                // what comes out of the dead time is what went in first
+                let v = if late.is_empty() { v } else { &late[late.len() - inputs.len()..] };
+                dot(states, own) + dot(inputs, v)
+            }
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+impl InnerLoop {
+    /// Why it does not fit around a G of so many states, inputs and outputs, or is none.
+    pub(crate) fn flaw(&self, states: usize, inputs: usize, outputs: usize) -> Option<String> {
+        let drives = self.drives.len();
+        if drives > states {
+            return Some(format!("drives {drives} states, but the dynamics have {states}"));
+        }
+        match &self.sees {
+            Sees::Output(output) if *output >= outputs => {
+                return Some(format!("sees output {output} of {outputs}"));
+            }
+            Sees::Mixture { states, .. } if states.len() != drives => {
+                return Some(format!("sees {} states, but drives {drives}", states.len()));
+            }
+            Sees::Mixture { inputs: seen, .. } if seen.len() != inputs => {
+                return Some(format!("sees {} inputs, but the dynamics have {inputs}", seen.len()));
+            }
+            _ => {}
+        }
+        match &self.law {
+            Law::Power { exponent, scale } if *exponent < 2 || *scale <= 0.0 => Some(format!(
+                "the power {exponent} of scale {scale} must be at least 2, the scale positive"
+            )),
+            Law::Stops { half_widths, weights } if half_widths.len() != weights.len() => Some(
+                format!("has {} half-widths, but {} weights", half_widths.len(), weights.len()),
+            ),
+            Law::Stops { half_widths, .. }
+                if half_widths.iter().any(|r| r.is_nan() || *r <= 0.0) =>
+            {
+                Some("the half-widths of its stops must be positive".to_owned())
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! The dynamics of a model as sections, with the loops around them in the same coordinates.
+
+use crate::effects::{Block, Effect, InnerLoop, Sees};
+use crate::linear::{Sections, StateSpace};
+use crate::{Error, Matrix, Model};
+
+/// G, and the model's effects whose loops drive and see the states of the sections.
+pub(crate) fn sections_of(model: &Model) -> Result<(Sections, Vec<Effect>), Error> {
+    let mut effects = model.effects().to_vec();
+    let blocks = model.effects().iter().map(Effect::block);
+    let loops: Vec<&InnerLoop> = blocks.flat_map(Block::loops).collect();
+    if loops.is_empty() {
+        return Ok((Sections::from_delayed_state_space(model.linear())?, effects));
+    }
+    let (own, delay) = without_delay(model.linear());
+    let (order, inputs, outputs) = (own.order(), own.inputs(), own.outputs());
+    let mut e = Matrix::zeros(order, loops.len());
+    let mut s = Matrix::zeros(loops.len(), order);
+    for (number, inner) in loops.iter().enumerate() {
+        let first = order - inner.drives.len();
+        e.column_mut(number).rows_mut(first, inner.drives.len()).copy_from_slice(&inner.drives);
+        if let Sees::Mixture { states, .. } = &inner.sees {
+            let row = nalgebra::RowDVector::from_row_slice(states);
+            s.row_mut(number).columns_mut(first, states.len()).copy_from(&row);
+        }
+    }
+    let mut b = own.b().clone().resize_horizontally(inputs + loops.len(), 0.0);
+    b.columns_mut(inputs, loops.len()).copy_from(&e);
+    let mut c = own.c().clone().resize_vertically(outputs + loops.len(), 0.0);
+    c.rows_mut(outputs, loops.len()).copy_from(&s);
+    let d = own.d().clone().resize(outputs + loops.len(), inputs + loops.len(), 0.0);
+    let around = StateSpace::new(own.a().clone(), b, c, d)?;
+    let (sections, e, s) = Sections::with_loops(&around, delay, (inputs, outputs))?;
+    let mut number = 0;
+    for effect in &mut effects {
+        for inner in effect.block_mut().loops_mut() {
+            inner.drives = e.column(number).iter().copied().collect();
+            if let Sees::Mixture { states, .. } = &mut inner.sees {
+                *states = s.row(number).iter().copied().collect();
+            }
+            number += 1;
+        }
+    }
+    Ok((sections, effects))
+}
+
+/// A state space without the shift registers of its inputs, if it begins with them, and how many
+/// samples they take.
+fn without_delay(system: &StateSpace) -> (StateSpace, usize) {
+    let inputs = system.inputs();
+    for delay in (1..=system.order() / inputs).rev() {
+        let first = delay * inputs;
+        let states = system.order() - first;
+        let (a, b, c, d) = (system.a(), system.b(), system.c(), system.d());
+        let registers = StateSpace::delayed_gain(&Matrix::identity(inputs, inputs), delay);
+        let late = first - inputs;
+        let begins = a.view((0, 0), (first, first)) == *registers.a()
+            && a.view((0, first), (first, states)).amax() == 0.0
+            && a.view((first, 0), (states, late)).amax() == 0.0
+            && b.rows(0, first) == *registers.b()
+            && b.rows(first, states).amax() == 0.0
+            && c.columns(0, late).amax() == 0.0
+            && d.amax() == 0.0;
+        let own = begins.then(|| {
+            StateSpace::new(
+                a.view((first, first), (states, states)).into_owned(),
+                a.view((first, late), (states, inputs)).into_owned(),
+                c.columns(first, states).into_owned(),
+                c.columns(late, inputs).into_owned(),
+            )
+        });
+        if let Some(Ok(own)) = own {
+            return (own, delay);
+        }
+    }
+    (system.clone(), 0)
+}

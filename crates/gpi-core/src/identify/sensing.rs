@@ -1,0 +1,33 @@
+//! The output stage of one output.
+
+use super::point::Point;
+use crate::effects::{Effect, Moment, Slope, Stage};
+
+/// The effects of the output stage on one output, with what they remember.
+pub(crate) struct Sensing<'a> {
+    blocks: Vec<(&'a Effect, Vec<f64>)>,
+}
+
+impl<'a> Sensing<'a> {
+    /// The output stood at `first`.
+    pub(crate) fn new(point: &'a Point, output: usize, first: f64) -> Self {
+        let own = point.at_stage(Stage::Output).filter(|e| e.block().channel() == output);
+        let mut value = first;
+        let blocks = own.map(|effect| {
+            let moment = point.moment(0, &[]);
+            let state = effect.block().rest(value, moment);
+            value = effect.block().sense(&mut state.clone(), value, moment).0;
+            (effect, state)
+        });
+        Self { blocks: blocks.collect() }
+    }
+
+    /// Takes one sample through; leaves how changes pass each effect.
+    pub(crate) fn step(&mut self, output: f64, moment: Moment, slopes: &mut Vec<Slope>) -> f64 {
+        self.blocks.iter_mut().fold(output, |value, (effect, state)| {
+            let (sensed, slope) = effect.block().sense(state, value, moment);
+            slopes.push(slope);
+            sensed
+        })
+    }
+}

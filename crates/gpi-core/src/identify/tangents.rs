@@ -1,0 +1,311 @@
+//! Derivatives by all unknowns, taken through G, its loops and the output stage side by side.
+
+use super::injections::{Injection, Places, Signals, injections};
+use super::lanes::{LANES, Lanes, NONE, add, pass, relax, weigh};
+use super::point::{Layout, Point};
+use crate::effects::{InnerLoop, Sees, Slope, Stage};
+use crate::linear::Section;
+use crate::{Experiment, Matrix};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// What has decayed so far in a state is nothing.
+const FADED: f64 = 1e-100;
+
+/// What a pass through the chain leaves for its derivatives, of a block of samples.
+pub(crate) struct Trace {
+    /// Samples of the experiment.
+    pub samples: Range<usize>,
+    /// Columns of signals, one a sample.
+    pub signals: Vec<f64>,
+    /// How changes pass each loop's law, loops one after the other, by samples.
+    pub marks: Vec<f64>,
+    /// How changes pass the effects of the output stage, by samples.
+    pub slopes: Vec<Slope>,
+    /// The samples that are scored, from the first one of the block.
+    pub scored: Vec<usize>,
+}
+
+/// Everything linear that a change runs through.
+pub(crate) struct Tangents<'a> {
+    sections: &'a [Section],
+    /// Rows of C by outputs, columns of B by inputs.
+    c: Vec<Vec<f64>>,
+    b: Vec<Vec<f64>>,
+    d: &'a Matrix,
+    loops: Vec<&'a InnerLoop>,
+    /// The output that each effect of the output stage acts on.
+    sensed: Vec<usize>,
+    signals: Signals,
+    places: Places,
+    /// The sample before which the state differs from that of an actuator that stood still.
+    warmup: usize,
+    tiles: Vec<Tile>,
+}
+
+/// Some unknowns beside each other.
+struct Tile {
+    first: usize,
+    injections: Vec<Injection>,
+    /// Unknowns that start as a state, and that state.
+    starts: Vec<(usize, usize)>,
+    /// Whether v changes.
+    drives: bool,
+    /// Sections and their states that change.
+    sections: Range<usize>,
+    states: Range<usize>,
+    x: Vec<Lanes>,
+    /// Changes that each effect of the output stage holds.
+    held: Vec<Lanes>,
+    /// Changes of the places of each loop's plays.
+    plays: Vec<Lanes>,
+    work: Vec<Lanes>,
+    /// Of each output, by scored samples.
+    rows: Vec<Vec<Lanes>>,
+}
+
+impl<'a> Tangents<'a> {
+    pub(crate) fn new(
+        point: &'a Point,
+        layout: &Layout,
+        signals: Signals,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Self {
+        let places = Places::new(point);
+        let dynamics = &point.dynamics;
+        let mut all = injections(point, layout, index, &signals, &places).into_iter().peekable();
+        let loops: Vec<&InnerLoop> = point.loops().collect();
+        let plays = loops.iter().map(|inner| inner.law.stops()).sum();
+        let sensing = point.at_stage(Stage::Output);
+        let mut sensed: Vec<usize> = sensing.map(|effect| effect.block().channel()).collect();
+        sensed.sort_unstable();
+        let start = layout.states[index].clone();
+        let tile = |first: usize| {
+            let own = first..layout.len.min(first + LANES);
+            let injections: Vec<Injection> =
+                std::iter::from_fn(|| all.next_if(|one| own.contains(&one.unknown))).collect();
+            let starts: Vec<(usize, usize)> = start
+                .clone()
+                .filter(|unknown| own.contains(unknown))
+                .map(|unknown| (unknown - first, unknown - start.start))
+                .collect();
+            let drives = injections.iter().any(|one| places.v.contains(&one.place));
+            // without a loop a section moves nothing but itself
+            let everything = drives || !loops.is_empty();
+            let entered = injections.iter().filter(|one| places.states.contains(&one.place));
+            let entered = entered.map(|one| one.place - places.states.start);
+            let moved: Vec<usize> = entered.chain(starts.iter().map(|(_, state)| *state)).collect();
+            let (sections, states) = moving(&dynamics.sections, &moved, everything);
+            Tile {
+                first,
+                injections,
+                starts,
+                drives,
+                sections,
+                states,
+                x: vec![NONE; dynamics.order()],
+                held: vec![NONE; sensed.len()],
+                plays: vec![NONE; plays],
+                work: vec![NONE; places.len],
+                rows: vec![Vec::new(); dynamics.outputs()],
+            }
+        };
+        let tiles: Vec<Tile> = (0..layout.len).step_by(LANES).map(tile).collect();
+        let (c, b) = by_states(&dynamics.sections, dynamics.outputs(), dynamics.inputs());
+        Self {
+            sections: &dynamics.sections,
+            c,
+            b,
+            d: &dynamics.d,
+            loops,
+            tiles: tiles.into_iter().filter(Tile::is_active).collect(),
+            sensed,
+            signals,
+            places,
+            warmup: experiment.warmup,
+        }
+    }
+
+    pub(crate) fn signals(&self) -> &Signals {
+        &self.signals
+    }
+
+    /// Takes all changes through a block; adds those of the scored samples to `regressors`, for each
+    /// output (unknowns, samples).
+    pub(crate) fn run(&mut self, trace: &Trace, regressors: &mut [Matrix]) {
+        /// Work, in tiles times samples times states, that pays for a second thread.
+        const PARALLEL: usize = 200_000;
+        let mut tiles = std::mem::take(&mut self.tiles);
+        let this = &*self;
+        let advance = |tile: &mut Tile| pulp::Arch::new().dispatch(|| this.advance(tile, trace));
+        if tiles.len() * trace.samples.len() * self.places.len > PARALLEL {
+            tiles.par_iter_mut().for_each(advance);
+        } else {
+            tiles.iter_mut().for_each(advance);
+        }
+        for tile in &tiles {
+            for (regressor, rows) in regressors.iter_mut().zip(&tile.rows) {
+                let count = LANES.min(regressor.nrows() - tile.first);
+                for (mut column, row) in regressor.column_iter_mut().zip(rows) {
+                    column.as_mut_slice()[tile.first..tile.first + count]
+                        .copy_from_slice(&row[..count]);
+                }
+            }
+        }
+        self.tiles = tiles;
+    }
+
+    /// One tile through a block.
+    #[inline(always)]
+    fn advance(&self, tile: &mut Tile, trace: &Trace) {
+        let Places { v, y, z, w, states, half_widths, .. } = &self.places;
+        let mut scored = trace.scored.iter().peekable();
+        tile.rows.iter_mut().for_each(Vec::clear);
+        let marks = trace.marks.len() / trace.samples.len();
+        for k in 0..trace.samples.len() {
+            let signals = &trace.signals[k * self.signals.len..(k + 1) * self.signals.len];
+            let work = &mut tile.work[..];
+            work.fill(NONE);
+            for one in &tile.injections {
+                work[one.place][one.unknown - tile.first] += one.factor * signals[one.signal];
+            }
+            let sample = trace.samples.start + k;
+            if sample == 0 {
+                self.stand(tile);
+            }
+            if sample == self.warmup {
+                tile.starts.iter().for_each(|&(lane, state)| tile.x[state][lane] += 1.0);
+            }
+            let work = &mut tile.work[..];
+            let x = &tile.x[tile.states.clone()];
+            for (output, c) in self.c.iter().enumerate() {
+                let mut sum = work[y.start + output];
+                weigh(&mut sum, &c[tile.states.clone()], x);
+                if tile.drives {
+                    for input in v.clone() {
+                        add(&mut sum, self.d[(output, input - v.start)], work[input]);
+                    }
+                }
+                work[y.start + output] = sum;
+            }
+            let mut marks = &trace.marks[k * marks..(k + 1) * marks];
+            let mut plays = &mut tile.plays[..];
+            for (number, inner) in self.loops.iter().enumerate() {
+                let mut sum = work[z.start + number];
+                match &inner.sees {
+                    Sees::Output(output) => add(&mut sum, 1.0, work[y.start + output]),
+                    Sees::Mixture { states, inputs } => {
+                        weigh(&mut sum, states, x);
+                        weigh(&mut sum, inputs, &work[v.clone()]);
+                    }
+                }
+                let (own, others) = marks.split_at(inner.law.marks());
+                let (places, rest) = plays.split_at_mut(inner.law.stops());
+                let widths = &work[half_widths[number].clone()];
+                let around = pass(&inner.law, sum, widths, own, places);
+                add(&mut work[w.start + number], 1.0, around);
+                (marks, plays) = (others, rest);
+            }
+            let scores = scored.next_if(|&&scored| scored == k).is_some();
+            if scores || !self.sensed.is_empty() {
+                let slopes = &trace.slopes[k * self.sensed.len()..(k + 1) * self.sensed.len()];
+                for ((&output, slope), held) in self.sensed.iter().zip(slopes).zip(&mut tile.held) {
+                    let row = &mut work[y.start + output];
+                    match slope {
+                        Slope::Times(factor) => row.iter_mut().for_each(|value| *value *= factor),
+                        Slope::Held => *row = *held,
+                    }
+                    *held = *row;
+                }
+            }
+            if scores {
+                let rows = tile.rows.iter_mut().zip(&work[y.clone()]);
+                rows.for_each(|(rows, row)| rows.push(*row));
+            }
+            if tile.drives {
+                for (input, b) in v.clone().zip(&self.b) {
+                    let change = work[input];
+                    let driven = work[states.clone()].iter_mut().zip(b);
+                    driven.for_each(|(next, b)| add(next, *b, change));
+                }
+            }
+            for (number, inner) in self.loops.iter().enumerate() {
+                let change = work[w.start + number];
+                let driven = work[states.clone()].iter_mut().zip(&inner.drives);
+                driven.for_each(|(next, drive)| add(next, *drive, change));
+            }
+            let mut first = tile.states.start;
+            for section in &self.sections[tile.sections.clone()] {
+                let order = section.order();
+                let next = &work[states.start + first..states.start + first + order];
+                relax(&section.a, &mut tile.x[first..first + order], next);
+                first += order;
+            }
+        }
+        // denormal numbers would take a hundred times as long, here and in the products of the rows
+        let faded = tile.x.iter_mut().flatten().filter(|value| value.abs() < FADED);
+        faded.for_each(|value| *value = 0.0);
+    }
+
+    /// Before the record what is injected at its first sample stood.
+    #[inline(always)]
+    fn stand(&self, tile: &mut Tile) {
+        let Places { v, states, .. } = &self.places;
+        let mut first = 0;
+        for section in self.sections {
+            let order = section.order();
+            let drive = Matrix::from_fn(order, LANES, |j, lane| {
+                let driven = v.clone().zip(&self.b);
+                tile.work[states.start + first + j][lane]
+                    + driven.map(|(input, b)| b[first + j] * tile.work[input][lane]).sum::<f64>()
+            });
+            let standing = section.standing(&drive);
+            for j in 0..order {
+                tile.x[first + j] = std::array::from_fn(|lane| standing[(j, lane)]);
+            }
+            first += order;
+        }
+    }
+}
+
+impl Tile {
+    fn is_active(&self) -> bool {
+        !self.injections.is_empty() || !self.starts.is_empty()
+    }
+}
+
+/// The range of sections that holds the states `moved`, or all, and the range of its states.
+fn moving(sections: &[Section], moved: &[usize], all: bool) -> (Range<usize>, Range<usize>) {
+    let mut found: Option<(Range<usize>, Range<usize>)> = None;
+    let mut first = 0;
+    for (place, section) in sections.iter().enumerate() {
+        let own = first..first + section.order();
+        if all || moved.iter().any(|state| own.contains(state)) {
+            found = Some(match found {
+                Some((sections, states)) => (sections.start..place + 1, states.start..own.end),
+                None => (place..place + 1, own.clone()),
+            });
+        }
+        first = own.end;
+    }
+    found.unwrap_or((0..0, 0..0))
+}
+
+/// Rows of C by outputs and columns of B by inputs, by the states of all sections.
+fn by_states(
+    sections: &[Section],
+    outputs: usize,
+    inputs: usize,
+) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+    let row = |output: usize| {
+        let own = sections.iter().flat_map(|s| s.c.row(output).iter().copied().collect::<Vec<_>>());
+        own.collect()
+    };
+    let column = |input: usize| {
+        let own =
+            sections.iter().flat_map(|s| s.b.column(input).iter().copied().collect::<Vec<_>>());
+        own.collect()
+    };
+    ((0..outputs).map(row).collect(), (0..inputs).map(column).collect())
+}
