@@ -130,6 +130,24 @@ def test_realisations_are_experiments_and_periods_are_joined(tmp_path: Path) -> 
     np.testing.assert_array_equal(chosen.u[0], record.u[1])
 
 
+def test_several_npy_pairs_are_one_record(tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    signals = {name: random.normal(size=(8, 2, 3)) for name in ("u_low", "u_high", "y_low", "y_high")}
+    for name, signal in signals.items():
+        np.save(tmp_path / f"{name}.npy", signal)
+    inputs = [tmp_path / "u_low.npy", tmp_path / "u_high.npy"]
+    record = gpi.read_record(inputs, output=["y_low.npy", "y_high.npy"], rate=10.0)
+    assert len(record.u) == 6
+    np.testing.assert_array_equal(record.u[4], signals["u_high"][:, :, 1])
+    np.testing.assert_array_equal(record.y[4], signals["y_high"][:, :, 1])
+    with pytest.raises(gpi.ParameterError, match="names 1 files, but 2 .npy files"):
+        gpi.read_record(inputs, output="y_low.npy", rate=10.0)
+    with pytest.raises(gpi.DataError, match=r"y_mid.npy: no such file"):
+        gpi.read_record(inputs, output=["y_low.npy", "y_mid.npy"], rate=10.0)
+    with pytest.raises(gpi.ParameterError, match=r"r.csv beside .npy files"):
+        gpi.read_record([*inputs, tmp_path / "r.csv"], rate=10.0)
+
+
 def test_a_record_without_output_can_be_read_but_not_identified(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "r.csv", {"t": T, "u": U})
     assert read_recording(path).runs[0].y.shape == (5, 0)

@@ -42,8 +42,8 @@ def read_record(
     input, output, covariate
         Names of the columns with or without their unit: ``"u_V"`` or ``"u"``. What is not given is
         found: inputs ``u``, ``u1``, ``input``; outputs ``y``, ``y1``, ``output``; every other column is a
-        covariate (``covariate=[]`` leaves them out). For a ``.npy`` file, which holds the input alone,
-        `output` is the path of the file that holds the output.
+        covariate (``covariate=[]`` leaves them out). For ``.npy`` files, which hold the input alone,
+        `output` is the path of the file that holds the output, one for each of them.
     time
         Name of the time column; ``t`` and ``time`` are found. The unit after its last underscore is
         heeded (``t_ms``), s when there is none.
@@ -135,15 +135,12 @@ def read_recording(
     paths = [Path(path)] if isinstance(path, str | os.PathLike) else [Path(one) for one in path]
     if not paths:
         raise ParameterError("`path`: no file is named; name at least one record")
-    if len(paths) > 1 and any(one.suffix == ".npy" for one in paths):
-        raise ParameterError(
-            f"`path`: {len(paths)} files are named, but a .npy record is 1 input and 1 output; use .npz"
-        )
+    output_files = _output_files(paths, _names(output))
     parts = []
     for one in paths:
         outputs = _names(output)
-        if one.suffix == ".npy":
-            tables, outputs = _read_npy(one, outputs), None
+        if output_files:
+            tables, outputs = read_npy_pair(one, output_files.get(one)), None
         else:
             tables = _read_tables(one)
         for table in tables:
@@ -181,22 +178,37 @@ def _read_tables(path: Path) -> list[Table]:
     )
 
 
-def _read_npy(path: Path, outputs: list[str] | None) -> list[Table]:
-    if not path.exists():
-        raise DataError(f"{path}: no such file; name a record")
-    if outputs is None:
-        return read_npy_pair(path, None)
-    if len(outputs) > 1:
+def _output_files(paths: Sequence[Path], outputs: list[str] | None) -> dict[Path, Path | None]:
+    """Find the .npy file of the output for each .npy file of the input; empty for other records."""
+    if not any(path.suffix == ".npy" for path in paths):
+        return {}
+    other = next((path for path in paths if path.suffix != ".npy"), None)
+    if other is not None:
         raise ParameterError(
-            f"`output` names {len(outputs)} files, but {path} needs 1: the .npy file of the output"
+            f"`path`: {other} beside .npy files; these hold one signal each and are named apart"
         )
-    output = Path(outputs[0])
-    # A bare file name means the folder of the input when there is no such file here.
-    if not output.exists() and (path.parent / output).exists():
-        output = path.parent / output
-    if not output.exists():
-        raise DataError(f"{output}: no such file; for a .npy record, `output` is the .npy file of the output")
-    return read_npy_pair(path, output)
+    for path in paths:
+        if not path.exists():
+            raise DataError(f"{path}: no such file; name a record")
+    if outputs is None:
+        return dict.fromkeys(paths)
+    if len(outputs) != len(paths):
+        raise ParameterError(
+            f"`output` names {len(outputs)} files, but {len(paths)} .npy files of inputs are named; "
+            "name the .npy file of the output for each of them, in the same order"
+        )
+    files: dict[Path, Path | None] = {}
+    for path, name in zip(paths, outputs, strict=True):
+        file = Path(name)
+        # A bare file name means the folder of the input when there is no such file here.
+        if not file.exists() and (path.parent / file).exists():
+            file = path.parent / file
+        if not file.exists():
+            raise DataError(
+                f"{file}: no such file; for a .npy record, `output` is the .npy file of the output"
+            )
+        files[path] = file
+    return files
 
 
 def _read_part(
