@@ -27,7 +27,7 @@ Output = Annotated[
     typer.Option(
         "--output",
         "-y",
-        help="Output columns; `y`, `y1`, `output` are found. For .npy records: the .npy files of the outputs.",
+        help="Output columns; `y`, `y1`, `output` are found. For .npy records: .npy files of the outputs.",
         rich_help_panel=COLUMNS,
     ),
 ]

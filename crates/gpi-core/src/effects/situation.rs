@@ -1,6 +1,7 @@
 //! What the candidates of the catalogue are placed by.
 
 use super::Effect;
+use crate::linear::Sections;
 use crate::{Matrix, Record};
 
 /// A base model on its record.
@@ -8,12 +9,16 @@ pub(crate) struct Situation<'a> {
     pub record: &'a Record,
     /// The drive of each experiment after the input stage, (samples, inputs).
     pub drives: &'a [Matrix],
+    /// v of each experiment, (samples, inputs).
+    pub intermediates: &'a [Matrix],
     /// What G makes of them, (samples, outputs), before the output stage.
     pub displacements: &'a [Matrix],
     /// Measured minus simulated.
     pub residuals: &'a [Matrix],
-    /// States of G, its dead time apart.
-    pub order: usize,
+    /// G alone.
+    pub dynamics: &'a Sections,
+    /// Loops that are closed around it.
+    pub loops: usize,
     /// Half-width of the widest play of each input.
     pub widest: Vec<f64>,
     /// The range of the plays' input, one an input.

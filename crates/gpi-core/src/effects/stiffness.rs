@@ -1,6 +1,7 @@
 //! A resonance that moves with amplitude.
 
 use super::{Block, Candidate, InnerLoop, Law, Quantity, Sees, Situation, Stage, Units};
+use crate::Matrix;
 
 /// Loops around G: a restoring force that is not in proportion to the displacement acts inside the
 /// mechanics, `x+ = A x + B v + E w`, `w = law(S x + T v)`.
@@ -19,31 +20,109 @@ impl Stiffness {
         "the resonance moves with amplitude: nonlinearity inside the mechanical loop";
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
-    pub(super) const REPEATS: bool = false;
+    pub(super) const REPEATS: bool = true;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
-        let order = situation.order;
         // A lag has no resonance to move.
-        if order < 2 || situation.outputs().len() > 1 {
+        if situation.dynamics.order() < 2 {
             return Vec::new();
         }
-        // half the span of the displacement
-        let scale = |output| 0.5 * situation.span(output);
-        let power = |output, exponent| InnerLoop {
-            sees: Sees::Output(output),
-            law: Law::Power { exponent, scale: scale(output) },
-            drives: vec![0.0; order],
-        };
-        let block = |output| Self { loops: [2, 3].map(|m| power(output, m)).to_vec() };
-        let moving = situation.outputs().filter(|&output| scale(output) > 0.0);
-        moving
-            .map(block)
-            .flat_map(|block| {
-                [order..2 * order, 0..2 * order]
-                    .map(|places| Candidate::linear(block.clone(), places))
-            })
-            .collect()
+        match (situation.outputs().len(), situation.loops) {
+            (1, 0) => powers(situation),
+            (1, _) => Vec::new(),
+            (_, 0) => stops(situation, displaced(situation)),
+            // what the input does to the mechanics by itself
+            (_, loops) if loops <= situation.inputs().len() => stops(situation, driven(situation)),
+            _ => Vec::new(),
+        }
     }
+}
+
+/// A cube of the displacement, and a square beside it.
+fn powers(situation: &Situation) -> Vec<Candidate> {
+    let order = situation.dynamics.order();
+    // half the span of the displacement
+    let scale = 0.5 * situation.span(0);
+    if scale <= 0.0 {
+        return Vec::new();
+    }
+    let power = |exponent| InnerLoop {
+        sees: Sees::Output(0),
+        law: Law::Power { exponent, scale },
+        drives: vec![0.0; order],
+    };
+    let block = Stiffness { loops: [2, 3].map(power).to_vec() };
+    [order..2 * order, 0..2 * order].map(|places| Candidate::linear(block.clone(), places)).to_vec()
+}
+
+/// Stops of these signals, which come with their root mean squares.
+fn stops(situation: &Situation, signals: Vec<(Sees, f64)>) -> Vec<Candidate> {
+    /// Half-widths over the root mean square.
+    const HALF_WIDTHS: [f64; 3] = [0.15, 0.5, 1.5];
+    let order = situation.dynamics.order();
+    let moving = signals.into_iter().filter(|(_, rms)| *rms > 0.0);
+    let inner = moving.map(|(sees, rms)| InnerLoop {
+        sees,
+        law: Law::Stops {
+            half_widths: HALF_WIDTHS.map(|r| r * rms).to_vec(),
+            weights: vec![1.0; HALF_WIDTHS.len()],
+        },
+        drives: vec![0.0; order],
+    });
+    let block = Stiffness { loops: inner.collect() };
+    let mut first = 0;
+    let mut places = Vec::new();
+    for inner in &block.loops {
+        places.extend(first..first + order);
+        first += values_of(inner);
+    }
+    if places.is_empty() { Vec::new() } else { vec![Candidate::linear(block, places)] }
+}
+
+/// The v that would hold each displacement still: `G(1)^-1 (C x + D v)`.
+fn displaced(situation: &Situation) -> Vec<(Sees, f64)> {
+    /// Combinations of outputs with less gain than this part of the largest are not seen.
+    const RANK: f64 = 1e-6;
+    let dynamics = situation.dynamics;
+    let dc = dynamics.dc_gain();
+    let Ok(inverse) = dc.clone().pseudo_inverse(RANK * dc.norm()) else { return Vec::new() };
+    let states = &inverse * dynamics.c();
+    let inputs = &inverse * &dynamics.d;
+    let row = |matrix: &Matrix, i: usize| matrix.row(i).iter().copied().collect::<Vec<f64>>();
+    let rms = |i: usize| {
+        let own = situation.displacements.iter().map(|y| y * inverse.row(i).transpose());
+        root_mean_square(own.collect::<Vec<_>>().iter().flat_map(|z| z.iter().copied()))
+    };
+    let sees = |i| Sees::Mixture { states: row(&states, i), inputs: row(&inputs, i) };
+    situation.inputs().map(|i| (sees(i), rms(i))).collect()
+}
+
+/// Each v.
+fn driven(situation: &Situation) -> Vec<(Sees, f64)> {
+    let count = situation.inputs().len();
+    let sees = |input: usize| Sees::Mixture {
+        states: vec![0.0; situation.dynamics.order()],
+        inputs: (0..count).map(|other| f64::from(u8::from(other == input))).collect(),
+    };
+    let rms = |input: usize| {
+        let own = situation.intermediates.iter();
+        root_mean_square(own.flat_map(|v| v.column(input).iter().copied().collect::<Vec<_>>()))
+    };
+    situation.inputs().map(|input| (sees(input), rms(input))).collect()
+}
+
+/// Without the mean.
+fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let (count, sum, squares) = values.fold((0.0, 0.0, 0.0), |(count, sum, squares), value| {
+        (count + 1.0, sum + value, squares + value * value)
+    });
+    let mean: f64 = sum / f64::max(count, 1.0);
+    (squares / f64::max(count, 1.0) - mean * mean).max(0.0).sqrt()
+}
+
+/// How many values a loop has.
+fn values_of(inner: &InnerLoop) -> usize {
+    Stiffness { loops: vec![inner.clone()] }.values().len()
 }
 
 /// A run of values of a loop.

@@ -124,9 +124,11 @@ impl<'a> Base<'a> {
             places: places.collect(),
             record: self.record,
             drives: &drives,
+            intermediates: &select(|signals| &signals.intermediate),
             displacements: &select(|signals| &signals.displacement),
             residuals: &self.residuals,
-            order: self.point.dynamics.own().order(),
+            dynamics: &self.point.dynamics.own(),
+            loops: self.point.loops().count(),
             widest: widest.collect(),
         })
     }

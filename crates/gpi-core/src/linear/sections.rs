@@ -245,6 +245,17 @@ impl Sections {
         own
     }
 
+    /// C, (outputs, order).
+    pub(crate) fn c(&self) -> Matrix {
+        let mut c = Matrix::zeros(self.outputs(), self.order());
+        let mut first = 0;
+        for section in &self.sections {
+            c.columns_mut(first, section.order()).copy_from(&section.c);
+            first += section.order();
+        }
+        c
+    }
+
     /// Adds first- or second-order sections with denominator `a` and numerator `b` from one input to all
     /// outputs, as those of the effect `beside`.
     pub(crate) fn push_beside(&mut self, beside: usize, input: usize, a: Vec<f64>, b: &[f64]) {
