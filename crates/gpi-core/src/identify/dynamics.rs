@@ -91,10 +91,15 @@ pub(crate) fn estimate(
 pub(crate) fn refit(record: &Record, system: StateSpace) -> Result<Refit, Error> {
     const BLOCK: usize = 1024;
     let (order, inputs, outputs) = (system.order(), system.inputs(), system.outputs());
-    let count = record.experiments().len();
-    let unknowns = order + inputs + count * (1 + order);
+    let begins = |experiment: &Experiment| experiment.warmup == 0;
+    // its offset, and its free response where no run-in hides it
+    let own = |experiment: &Experiment| if begins(experiment) { 1 + order } else { 1 };
+    let unknowns = order + inputs + record.experiments().iter().map(own).sum::<usize>();
+    let mut next = order + inputs;
     let mut equations = NormalEquations::zeros(unknowns, outputs);
-    for (index, experiment) in record.experiments().iter().enumerate() {
+    for experiment in record.experiments() {
+        let first = next;
+        next += own(experiment);
         let states = states(&system, experiment);
         let samples = experiment.input.nrows();
         let mut free = system.b().column_sum();
@@ -108,10 +113,9 @@ pub(crate) fn refit(record: &Record, system: StateSpace) -> Result<Refit, Error>
                 for input in 0..inputs {
                     row[order + input] = experiment.input[(k, input)];
                 }
-                let own = order + inputs + index * (1 + order);
-                row[own] = 1.0;
-                if experiment.warmup == 0 {
-                    row[own + 1..own + 1 + order].copy_from_slice(free.as_slice());
+                row[first] = 1.0;
+                if begins(experiment) {
+                    row[first + 1..next].copy_from_slice(free.as_slice());
                     free = system.a() * &free;
                 }
                 column.copy_from_slice(&row);

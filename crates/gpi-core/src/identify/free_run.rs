@@ -8,6 +8,7 @@ use crate::effects::{Block, Effect, InnerLoop, Moment, Stage};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::{DVector, RowDVector};
+use rayon::prelude::*;
 
 impl Point {
     /// Other dynamics, which stood still before the record.
@@ -268,7 +269,7 @@ impl Point {
 
     /// Measured minus simulated outputs of each experiment, (samples, outputs), warm-ups included.
     pub(crate) fn residuals(&self, record: &Record) -> Result<Vec<Matrix>, Error> {
-        let runs = record.experiments().iter().zip(&self.offsets).enumerate();
+        let runs = record.experiments().par_iter().zip(&self.offsets).enumerate();
         runs.map(|(index, (experiment, offsets))| {
             let samples = experiment.input.nrows();
             let known = self.signals(experiment, index)?;

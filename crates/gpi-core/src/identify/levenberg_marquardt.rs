@@ -73,6 +73,8 @@ pub(crate) fn fit(
     progress: Progress,
 ) -> Result<Fitted, Error> {
     const LARGEST_DAMPING: f64 = 1e6;
+    /// What a step gains over what it promised, where the curvature is right.
+    const RIGHT: f64 = 0.5;
     let linearize = |point: &Point, step: usize, progress: Progress| {
         let done = step as f64 / options.steps as f64;
         let mut check = || report(progress, stage, done);
@@ -105,8 +107,15 @@ pub(crate) fn fit(
         let trial = point.moved(&change, layout);
         // a step that leads nowhere need not be linearized
         report(progress, stage, step as f64 / options.steps as f64)?;
-        if options.weighting.cost(&trial.residuals(record)?, record) < current.cost {
-            let linearization = linearize(&trial, step, progress)?;
+        let cost = options.weighting.cost(&trial.residuals(record)?, record);
+        if cost < current.cost {
+            let linearization = if current.cost - cost > RIGHT * predicted {
+                let mut check = || report(progress, stage, step as f64 / options.steps as f64);
+                let FitOptions { freedom, weighting, .. } = options;
+                current.near(&trial, record, *freedom, weighting, &mut check)?
+            } else {
+                linearize(&trial, step, progress)?
+            };
             let gained = current.cost - linearization.cost;
             let small =
                 gained < options.gain * current.cost && predicted < options.gain * current.cost;
@@ -120,6 +129,8 @@ pub(crate) fn fit(
                 status = Status::Converged;
                 break;
             }
+        } else if current.is_old() {
+            current = linearize(&point, step, progress)?;
         } else if damping > LARGEST_DAMPING {
             status = Status::Stalled;
             break;

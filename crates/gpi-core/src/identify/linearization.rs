@@ -1,6 +1,8 @@
 //! The model linearized around a point, gathered into normal equations.
 
+use super::adjoint::descent;
 use super::point::{Freedom, Layout, Point};
+use super::representatives::representatives;
 use super::stream::{Rows, Stream};
 use crate::linear::NormalEquations;
 use crate::{Error, Matrix, Record};
@@ -83,10 +85,13 @@ pub(crate) struct Linearization {
     pub layout: Layout,
     /// Sum of the losses.
     pub cost: f64,
+    /// How many steps ago the curvature was worked out, where it is that of a few experiments.
+    age: Option<usize>,
 }
 
 impl Linearization {
-    /// Streams the record through the model and its derivatives.
+    /// Streams the record through the model and its derivatives. Where all of its derivatives would take long,
+    /// the curvature is that of a few experiments; the gradient is always that of the whole record.
     pub(crate) fn new(
         point: &Point,
         record: &Record,
@@ -95,13 +100,52 @@ impl Linearization {
         check: &mut dyn FnMut() -> Result<(), Error>,
     ) -> Result<Self, Error> {
         let layout = Layout::new(point, freedom);
+        let few = representatives(point, record, layout.len);
         let mut gathered = Gathered::new(layout.len);
-        for (index, experiment) in record.experiments().iter().enumerate() {
+        let all = (0..record.experiments().len()).collect();
+        for &index in few.as_ref().map_or(&all, |few| &few.experiments) {
             check()?;
+            let experiment = &record.experiments()[index];
             let stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
-            gather(stream, check, |rows| gathered.add(rows, weighting))?;
+            let (memory, stride) =
+                few.as_ref().map_or((usize::MAX, 1), |few| (few.memory, few.stride));
+            gather(stream.with_memory(memory), check, |rows| {
+                gathered.add(rows.thinned(stride), weighting);
+            })?;
         }
-        Ok(Self { equations: gathered.equations, cost: gathered.cost, layout })
+        let Gathered { mut equations, mut cost } = gathered;
+        let age = few.is_some().then_some(0);
+        if let Some(few) = few {
+            few.extend(&mut equations.gram, &layout, record);
+            let (descent, whole) = descent(point, &layout, freedom, weighting, record, check)?;
+            equations.rhs.set_column(0, &descent);
+            cost = whole;
+        }
+        Ok(Self { equations, cost, layout, age })
+    }
+
+    /// At a point near by: where the curvature is that of a few experiments, it is kept for a while.
+    pub(crate) fn near(
+        &self,
+        point: &Point,
+        record: &Record,
+        freedom: Freedom,
+        weighting: &Weighting,
+        check: &mut dyn FnMut() -> Result<(), Error>,
+    ) -> Result<Self, Error> {
+        const OLDEST: usize = 2;
+        let Some(age) = self.age.filter(|&age| age < OLDEST) else {
+            return Self::new(point, record, freedom, weighting, check);
+        };
+        let (descent, cost) = descent(point, &self.layout, freedom, weighting, record, check)?;
+        let mut near = Self { cost, age: Some(age + 1), ..self.clone() };
+        near.equations.rhs.set_column(0, &descent);
+        Ok(near)
+    }
+
+    /// Whether the curvature is that of an earlier point.
+    pub(crate) fn is_old(&self) -> bool {
+        self.age.is_some_and(|age| age > 0)
     }
 
     /// Half the steepest descent of the cost.

@@ -8,6 +8,7 @@
 //!
 //! Everything is fitted and chosen on the record that is given.
 
+mod adjoint;
 mod bands;
 pub(crate) mod chain;
 pub(crate) mod colour;
@@ -23,6 +24,8 @@ mod inner_loops;
 mod lanes;
 pub(crate) mod levenberg_marquardt;
 pub(crate) mod linearization;
+#[cfg(test)]
+mod looped;
 mod motion;
 mod names;
 pub(crate) mod noise_floor;
@@ -32,6 +35,7 @@ pub(crate) mod point;
 pub(crate) mod preparation;
 mod quasi_static;
 pub(crate) mod refine;
+pub(crate) mod representatives;
 mod sensing;
 mod sensitivities;
 pub(crate) mod sensitivity;

@@ -6,6 +6,7 @@ use super::noise_floor::NoiseFloor;
 use super::outliers;
 use super::point::{DynamicsFreedom, Freedom, Layout, Point};
 use super::preparation::Prepared;
+use super::representatives::representatives;
 use super::sensitivities::names_and_values;
 use super::sensitivity::{Derivatives, Parameters};
 use super::uncertainty::Uncertainty;
@@ -181,6 +182,8 @@ pub(crate) fn joint(
     const STEPS: std::ops::RangeInclusive<usize> = 40..=300;
     const PRODUCTS: f64 = 4e11;
     const QUICK: usize = 40;
+    /// Where each step takes long.
+    const QUICK_GAIN: f64 = 1e-3;
     /// Passes of Huber's loss, each with the scale that the one before found.
     const PASSES: usize = 3;
     let record = &prepared.record;
@@ -195,6 +198,9 @@ pub(crate) fn joint(
     settings.steps = ((PRODUCTS / products) as usize).clamp(*STEPS.start(), *STEPS.end());
     if quick {
         settings.steps = settings.steps.min(QUICK);
+        if representatives(&point, record, needed).is_some() {
+            settings.gain = QUICK_GAIN;
+        }
     }
     if record.scored() * record.outputs().len() < needed {
         let purpose = "all parameters of the refinement".to_owned();
@@ -284,10 +290,9 @@ impl Refined {
     /// The information criterion's ingredients: the covariance.
     pub(crate) fn uncertainty(
         &self,
-        prepared: &Prepared,
+        record: &Record,
         progress: Progress,
     ) -> Result<Uncertainty, Error> {
-        let record = &prepared.record;
         let residuals = self.fitted.point.residuals(record)?;
         let mut check = || report(progress, "uncertainty", 0.0);
         Uncertainty::new(&self.fitted, record, &self.options, residuals, &mut check)
@@ -316,7 +321,7 @@ impl Refined {
         const LOSS: f64 = 5.0;
         self.drop_unused(prepared, progress)?;
         for _ in 0..PASSES {
-            let open = self.uncertainty(prepared, progress)?.open;
+            let open = self.uncertainty(&prepared.record, progress)?.open;
             let mut simpler = self.clone();
             let layout = &self.fitted.linearization.layout;
             if !simpler.fitted.point.silence_deadzones(layout, &open) {
@@ -342,7 +347,7 @@ impl Refined {
         let values = prepared.values();
         let status = self.fitted.status;
         self.drop_unused(prepared, progress)?;
-        let uncertainty = self.uncertainty(prepared, progress)?;
+        let uncertainty = self.uncertainty(record, progress)?;
         let Fitted { point, linearization, history, .. } = self.fitted;
         let residuals = point.residuals(record)?;
         let layout = linearization.layout;

@@ -21,6 +21,21 @@ pub(crate) struct Rows {
     pub residuals: Matrix,
 }
 
+impl Rows {
+    /// One of every so many.
+    pub(crate) fn thinned(self, stride: usize) -> Self {
+        if stride == 1 {
+            return self;
+        }
+        let places: Vec<usize> = (0..self.residuals.ncols()).step_by(stride).collect();
+        let thin = |matrix: &Matrix| matrix.select_columns(&places);
+        Self {
+            regressors: self.regressors.iter().map(thin).collect(),
+            residuals: thin(&self.residuals),
+        }
+    }
+}
+
 /// Streams one experiment and hands its rows on block by block.
 pub(crate) struct Stream<'a> {
     point: &'a Point,
@@ -43,6 +58,8 @@ pub(crate) struct Stream<'a> {
     displaced: Matrix,
     /// What effects add to the output, (samples, outputs).
     added: Matrix,
+    /// The sample from which on derivatives are taken along.
+    tangents_from: usize,
 }
 
 impl<'a> Stream<'a> {
@@ -77,6 +94,7 @@ impl<'a> Stream<'a> {
             effects: point.effect_columns(experiment, index)?,
             displaced: added(Stage::Displaced),
             added: added(Stage::Added),
+            tangents_from: 0,
             point,
             layout,
             experiment,
@@ -84,39 +102,54 @@ impl<'a> Stream<'a> {
         })
     }
 
+    /// Takes derivatives along from so many samples before the first scored one only: what they were before
+    /// has decayed.
+    pub(crate) fn with_memory(mut self, samples: usize) -> Self {
+        self.tangents_from = self.experiment.warmup.saturating_sub(samples);
+        self
+    }
+
     /// Hands the rows of all scored samples on.
     pub(crate) fn run(
         &mut self,
         consume: &mut dyn FnMut(Rows) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let (samples, outputs) = (self.experiment.input.nrows(), self.point.dynamics.outputs());
+        let outputs = self.point.dynamics.outputs();
         let is_scored = self.scored();
-        for first in (0..samples).step_by(BLOCK) {
-            let block = first..samples.min(first + BLOCK);
-            let scored: Vec<usize> =
-                block.clone().filter(|&k| is_scored[k]).map(|k| k - first).collect();
-            let mut residuals = Matrix::zeros(outputs, scored.len());
-            let mut trace = Trace {
-                samples: block,
-                signals: Vec::new(),
-                marks: Vec::new(),
-                slopes: Vec::new(),
-                scored,
-            };
-            self.pass(&mut trace, &mut residuals);
+        for first in self.blocks() {
+            let (trace, residuals) = self.pass(first, &is_scored);
+            if trace.samples.end <= self.tangents_from {
+                continue;
+            }
             let mut regressors = vec![Matrix::zeros(self.layout.len, trace.scored.len()); outputs];
             self.tangents.run(&trace, &mut regressors);
             if trace.scored.is_empty() {
                 continue;
             }
             for (output, regressor) in regressors.iter_mut().enumerate() {
-                for (row, k) in regressor.column_iter_mut().zip(&trace.scored) {
-                    self.fill_added(output, first + k, row);
+                for (mut row, k) in regressor.column_iter_mut().zip(&trace.scored) {
+                    self.added(output, first + k, |unknown, derivative| row[unknown] = derivative);
                 }
             }
             consume(Rows { regressors, residuals })?;
         }
         Ok(())
+    }
+
+    /// What all blocks leave for derivatives, and the residuals (outputs, scored samples) of each.
+    pub(crate) fn traces(&mut self) -> Vec<(Trace, Matrix)> {
+        let is_scored = self.scored();
+        self.blocks().map(|first| self.pass(first, &is_scored)).collect()
+    }
+
+    /// What the traces hold.
+    pub(crate) fn signals(&self) -> &Signals {
+        self.tangents.signals()
+    }
+
+    /// The first samples of all blocks.
+    fn blocks(&self) -> impl Iterator<Item = usize> + use<> {
+        (0..self.experiment.input.nrows()).step_by(BLOCK)
     }
 
     /// Which samples are scored.
@@ -128,12 +161,22 @@ impl<'a> Stream<'a> {
         scored
     }
 
-    /// Runs the model through a block: leaves the residuals of its scored samples, and what its
-    /// derivatives need.
-    fn pass(&mut self, trace: &mut Trace, residuals: &mut Matrix) {
+    /// Runs the model through a block from a sample on: what its derivatives need, and the residuals of its
+    /// scored samples.
+    fn pass(&mut self, first: usize, is_scored: &[bool]) -> (Trace, Matrix) {
+        let block = first..is_scored.len().min(first + BLOCK);
+        let scored: Vec<usize> =
+            block.clone().filter(|&k| is_scored[k]).map(|k| k - first).collect();
+        let mut residuals = Matrix::zeros(self.point.dynamics.outputs(), scored.len());
         let Signals { columns, readings, states, loops, len } = self.tangents.signals();
+        let mut trace = Trace {
+            signals: vec![0.0; len * block.len()],
+            samples: block,
+            marks: Vec::new(),
+            slopes: Vec::new(),
+            scored,
+        };
         let Past { state, moving, .. } = &self.point.pasts[self.index];
-        trace.signals.resize(len * trace.samples.len(), 0.0);
         let mut scored = trace.scored.iter().enumerate().peekable();
         let mut v = vec![0.0; self.sensitivities.len()];
         for (place, k) in trace.samples.clone().enumerate() {
@@ -185,6 +228,7 @@ impl<'a> Stream<'a> {
             }
             self.motion.advance(&v);
         }
+        (trace, residuals)
     }
 
     /// The slowly varying offset of an output.
@@ -194,17 +238,18 @@ impl<'a> Stream<'a> {
         hats.map(|(knot, weight)| weight * knots[(knot, output)]).sum()
     }
 
-    /// Writes the derivatives of what is added behind the output stage, and by the values of effects.
-    fn fill_added(&self, output: usize, k: usize, mut row: nalgebra::DVectorViewMut<f64>) {
+    /// Calls `each` with the derivatives of what is added behind the output stage, and by the values of effects
+    /// whose own do not stream along.
+    pub(crate) fn added(&self, output: usize, k: usize, mut each: impl FnMut(usize, f64)) {
         let layout = self.layout;
         let knots = self.point.offsets[self.index].nrows();
         let first = layout.offsets[self.index].start + output * knots;
         for (knot, weight) in hats(k, self.experiment.input.nrows(), knots) {
-            row[first + knot] = weight;
+            each(first + knot, weight);
         }
         for (columns, unknowns) in self.effects.iter().zip(&layout.effects) {
-            for (column, i) in columns.iter().zip(unknowns.clone()) {
-                row[i] = column[(k, output)];
+            for (column, unknown) in columns.iter().zip(unknowns.clone()) {
+                each(unknown, column[(k, output)]);
             }
         }
     }

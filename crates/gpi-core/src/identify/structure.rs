@@ -185,7 +185,7 @@ impl<'a> Search<'a> {
         let costs = usable.map(|(refined, _)| refined.fitted.linearization.cost);
         let hopeless = HOPELESS * costs.fold(f64::INFINITY, f64::min);
         let refined = joint(point, self.prepared, &self.options, hopeless, self.fast, progress)?;
-        let uncertainty = refined.uncertainty(self.prepared, progress)?;
+        let uncertainty = refined.uncertainty(&self.prepared.record, progress)?;
         let parameters = uncertainty.estimated;
         let point = &refined.fitted.point;
         self.candidates.push(Candidate {

@@ -77,9 +77,7 @@ impl<'a> Tangents<'a> {
         let mut all = injections(point, layout, index, &signals, &places).into_iter().peekable();
         let loops: Vec<&InnerLoop> = point.loops().collect();
         let plays = loops.iter().map(|inner| inner.law.stops()).sum();
-        let sensing = point.at_stage(Stage::Output);
-        let mut sensed: Vec<usize> = sensing.map(|effect| effect.block().channel()).collect();
-        sensed.sort_unstable();
+        let sensed = sensed(point);
         let start = layout.states[index].clone();
         let tile = |first: usize| {
             let own = first..layout.len.min(first + LANES);
@@ -275,6 +273,14 @@ impl Tile {
     }
 }
 
+/// The output that each effect of the output stage acts on, in the order in which they act.
+pub(super) fn sensed(point: &Point) -> Vec<usize> {
+    let effects = point.at_stage(Stage::Output);
+    let mut sensed: Vec<usize> = effects.map(|effect| effect.block().channel()).collect();
+    sensed.sort_unstable();
+    sensed
+}
+
 /// The range of sections that holds the states `moved`, or all, and the range of its states.
 fn moving(sections: &[Section], moved: &[usize], all: bool) -> (Range<usize>, Range<usize>) {
     let mut found: Option<(Range<usize>, Range<usize>)> = None;
@@ -293,7 +299,7 @@ fn moving(sections: &[Section], moved: &[usize], all: bool) -> (Range<usize>, Ra
 }
 
 /// Rows of C by outputs and columns of B by inputs, by the states of all sections.
-fn by_states(
+pub(super) fn by_states(
     sections: &[Section],
     outputs: usize,
     inputs: usize,

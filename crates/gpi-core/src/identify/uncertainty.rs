@@ -3,10 +3,11 @@
 
 use super::colour::Colour;
 use super::levenberg_marquardt::{FitOptions, Fitted};
-use super::linearization::Weighting;
+use super::linearization::{Weighting, gather};
 use super::point::{Bounds, Freedom, Layout, Point};
+use super::representatives::representatives;
 use super::stream::Stream;
-use crate::linear::NormalEquations;
+use crate::linear::{NormalEquations, symmetric_eigen};
 use crate::{Error, Matrix, Record};
 use nalgebra::DVector;
 
@@ -173,12 +174,15 @@ fn score_gram(
     let (values, vectors) = descending_eigen(colour.innovations.clone());
     let root = vectors * Matrix::from_diagonal(&values.map(|value| value.max(0.0).sqrt()));
     let mut equations = NormalEquations::zeros(layout.len, 1);
-    for (index, experiment) in record.experiments().iter().enumerate() {
-        let mut stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
+    let few = representatives(point, record, layout.len);
+    let all = (0..record.experiments().len()).collect();
+    for &index in few.as_ref().map_or(&all, |few| &few.experiments) {
+        let experiment = &record.experiments()[index];
+        let stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
+        let (memory, stride) = few.as_ref().map_or((usize::MAX, 1), |few| (few.memory, few.stride));
         let mut past: Vec<Matrix> =
             colour.coefficients.iter().map(|a| Matrix::zeros(layout.len, a.len())).collect();
-        stream.run(&mut |rows| {
-            check()?;
+        gather(stream.with_memory(memory), check, |rows| {
             let mut filtered = Vec::new();
             for (output, regressor) in rows.regressors.iter().enumerate() {
                 let (filter, past) = (&colour.coefficients[output], &mut past[output]);
@@ -197,24 +201,33 @@ fn score_gram(
                 past.copy_from(&extended.columns(count, order));
                 filtered.push(extended.columns(order, count).into_owned());
             }
-            let none = Matrix::zeros(1, rows.residuals.ncols());
+            let places: Vec<usize> = (0..rows.residuals.ncols()).step_by(stride).collect();
+            let none = Matrix::zeros(1, places.len());
             for mixed in 0..outputs {
                 let mut sum = &filtered[0] * root[(0, mixed)];
                 for (output, part) in filtered.iter().enumerate().skip(1) {
                     sum += part * root[(output, mixed)];
                 }
-                equations.add(&sum, &none);
+                equations.add(&sum.select_columns(&places), &none);
             }
-            Ok(())
         })?;
+    }
+    if let Some(few) = few {
+        few.extend(&mut equations.gram, &layout, record);
     }
     Ok(equations.gram)
 }
 
-/// Eigenvalues (descending) and eigenvectors of a small symmetric matrix: by nalgebra, since faer keeps
+/// Eigenvalues (descending) and eigenvectors of a symmetric matrix: of a small one by nalgebra, since faer keeps
 /// a workspace of megabytes, more than a record may take.
 pub(crate) fn descending_eigen(matrix: Matrix) -> (DVector<f64>, Matrix) {
+    const LARGE: usize = 300;
     let n = matrix.nrows();
+    if n > LARGE
+        && let Ok(found) = symmetric_eigen(&matrix)
+    {
+        return found;
+    }
     let eigen = matrix.symmetric_eigen();
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));

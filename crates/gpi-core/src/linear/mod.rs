@@ -18,6 +18,7 @@ pub use state_space::StateSpace;
 pub use transfer_function::TransferFunction;
 pub use zero_order_hold::zero_order_hold;
 
+pub(crate) use decompose::symmetric_eigen;
 pub(crate) use era::Hankel;
 pub(crate) use fir::excitation_limit;
 pub(crate) use least_squares::{NormalEquations, bounded};

@@ -1,0 +1,311 @@
+//! The gradient of the cost by all unknowns at once: one pass through an experiment, and one back.
+
+use super::injections::{Injection, Places, injections};
+use super::linearization::Weighting;
+use super::point::{Freedom, Layout, Point};
+use super::stream::Stream;
+use super::tangents::{Trace, by_states, sensed};
+use crate::effects::{InnerLoop, Law, Sees, Slope};
+use crate::linear::Section;
+use crate::{Error, Experiment, Matrix, Record};
+use nalgebra::{DMatrixView, DVector};
+use rayon::prelude::*;
+
+/// Half the steepest descent of the cost of a record, and the cost.
+///
+/// What a residual says of its sample is carried back through the chain to every place where an unknown
+/// enters, at the price of one more simulation whatever the number of unknowns.
+pub(crate) fn descent(
+    point: &Point,
+    layout: &Layout,
+    freedom: Freedom,
+    weighting: &Weighting,
+    record: &Record,
+    check: &mut dyn FnMut() -> Result<(), Error>,
+) -> Result<(DVector<f64>, f64), Error> {
+    let mut sum = (DVector::zeros(layout.len), 0.0);
+    let all: Vec<(usize, &Experiment)> = record.experiments().iter().enumerate().collect();
+    for some in all.chunks(rayon::current_num_threads()) {
+        check()?;
+        let of = |&(index, experiment): &(usize, &Experiment)| {
+            descent_of(point, layout, freedom, weighting, experiment, index)
+        };
+        let found: Vec<_> = some.par_iter().map(of).collect();
+        for one in found {
+            let (descent, cost) = one?;
+            sum = (sum.0 + descent, sum.1 + cost);
+        }
+    }
+    Ok(sum)
+}
+
+/// The same of one experiment.
+fn descent_of(
+    point: &Point,
+    layout: &Layout,
+    freedom: Freedom,
+    weighting: &Weighting,
+    experiment: &Experiment,
+    index: usize,
+) -> Result<(DVector<f64>, f64), Error> {
+    let mut stream = Stream::new(point, layout, freedom.derivatives, experiment, index)?;
+    let mut descent = DVector::zeros(layout.len);
+    let mut cost = 0.0;
+    let mut blocks = stream.traces();
+    for (trace, residuals) in &mut blocks {
+        for (mut column, k) in residuals.column_iter_mut().zip(&trace.scored) {
+            for (output, value) in column.iter_mut().enumerate() {
+                let (weight, loss) = weighting.of(output, *value);
+                cost += loss;
+                *value *= weight;
+                let said = *value;
+                stream.added(output, trace.samples.start + k, |unknown, derivative| {
+                    descent[unknown] += derivative * said;
+                });
+            }
+        }
+    }
+    let signals = stream.signals();
+    let places = Places::new(point);
+    let injections = injections(point, layout, index, signals, &places);
+    let mut back = Back::new(point, &places, signals.len, experiment.warmup);
+    for (trace, residuals) in blocks.iter().rev() {
+        back.run(trace, residuals);
+    }
+    for Injection { unknown, place, signal, factor } in injections {
+        descent[unknown] += factor * back.met[(place, signal)];
+    }
+    for (unknown, said) in layout.states[index].clone().zip(back.start) {
+        descent[unknown] += said;
+    }
+    Ok((descent, cost))
+}
+
+/// The chain backwards in time: what the cost makes of a change at each place.
+struct Back<'a> {
+    sections: &'a [Section],
+    /// Rows of C by outputs, columns of B by inputs.
+    c: Vec<Vec<f64>>,
+    b: Vec<Vec<f64>>,
+    d: &'a Matrix,
+    loops: Vec<&'a InnerLoop>,
+    /// The output that each effect of the output stage acts on.
+    sensed: Vec<usize>,
+    places: &'a Places,
+    warmup: usize,
+    /// Of the state behind the sample.
+    x: Vec<f64>,
+    /// Of what each effect of the output stage holds.
+    held: Vec<f64>,
+    /// Of where each loop's plays stand.
+    plays: Vec<f64>,
+    /// Of the state at the end of the warm-up.
+    start: Vec<f64>,
+    /// (places, signals): sums over all samples of a place's change times a signal.
+    met: Matrix,
+}
+
+impl<'a> Back<'a> {
+    fn new(point: &'a Point, places: &'a Places, signals: usize, warmup: usize) -> Self {
+        let dynamics = &point.dynamics;
+        let loops: Vec<&InnerLoop> = point.loops().collect();
+        let (c, b) = by_states(&dynamics.sections, dynamics.outputs(), dynamics.inputs());
+        let sensed = sensed(point);
+        Self {
+            sections: &dynamics.sections,
+            c,
+            b,
+            d: &dynamics.d,
+            plays: vec![0.0; loops.iter().map(|inner| inner.law.stops()).sum()],
+            loops,
+            held: vec![0.0; sensed.len()],
+            sensed,
+            places,
+            warmup,
+            x: vec![0.0; dynamics.order()],
+            start: vec![0.0; dynamics.order()],
+            met: Matrix::zeros(places.len, signals),
+        }
+    }
+
+    /// A block of samples, from its last to its first; `residuals` (outputs, scored samples) are weighted.
+    fn run(&mut self, trace: &Trace, residuals: &Matrix) {
+        let samples = trace.samples.len();
+        let mut work = Matrix::zeros(self.places.len, samples);
+        let marks = trace.marks.len() / samples;
+        let slopes = self.sensed.len();
+        let mut scored = trace.scored.iter().enumerate().rev().peekable();
+        for (k, mut work) in work.column_iter_mut().enumerate().rev() {
+            let work = work.as_mut_slice();
+            let own = scored.next_if(|(_, scored)| **scored == k);
+            if let Some((column, _)) = own {
+                work[self.places.y.clone()].copy_from_slice(residuals.column(column).as_slice());
+            }
+            self.sense(work, &trace.slopes[k * slopes..(k + 1) * slopes]);
+            self.advance(work);
+            self.circulate(work, &trace.marks[k * marks..(k + 1) * marks]);
+            self.observe(work);
+            let sample = trace.samples.start + k;
+            if sample == self.warmup {
+                self.start.clone_from(&self.x);
+            }
+            if sample == 0 {
+                self.stand(work);
+            }
+        }
+        let len = self.met.ncols();
+        let signals = DMatrixView::from_slice(&trace.signals, len, samples);
+        self.met.gemm(1.0, &work, &signals.transpose(), 1.0);
+    }
+
+    /// The output stage.
+    fn sense(&mut self, work: &mut [f64], slopes: &[Slope]) {
+        let stages = self.sensed.iter().zip(slopes).zip(&mut self.held);
+        for ((&output, slope), held) in stages.rev() {
+            let row = &mut work[self.places.y.start + output];
+            let said = *row + *held;
+            (*row, *held) = match slope {
+                Slope::Times(factor) => (factor * said, 0.0),
+                Slope::Held => (0.0, said),
+            };
+        }
+    }
+
+    /// What moves the state on.
+    fn advance(&mut self, work: &mut [f64]) {
+        let Places { v, w, states, .. } = self.places;
+        work[states.clone()].copy_from_slice(&self.x);
+        for (place, b) in v.clone().zip(&self.b) {
+            work[place] += dot(b, &self.x);
+        }
+        for (place, inner) in w.clone().zip(&self.loops) {
+            work[place] += dot(&inner.drives, &self.x);
+        }
+        let mut first = 0;
+        for section in self.sections {
+            let x = &mut self.x[first..first + section.order()];
+            match (&section.a[..], x) {
+                ([a1, a2], [x1, x2]) => (*x1, *x2) = (-a1 * *x1 - a2 * *x2, *x1),
+                (a, x) => x[0] *= -a[0],
+            }
+            first += section.order();
+        }
+    }
+
+    /// The loops.
+    fn circulate(&mut self, work: &mut [f64], mut marks: &[f64]) {
+        let Places { v, y, z, w, half_widths, .. } = self.places;
+        let mut plays = &mut self.plays[..];
+        for (number, inner) in self.loops.iter().enumerate() {
+            let (own, others) = marks.split_at(inner.law.marks());
+            let (places, rest) = plays.split_at_mut(inner.law.stops());
+            let around = work[w.start + number];
+            let mut said = 0.0;
+            match &inner.law {
+                Law::Power { .. } => said += own[0] * around,
+                Law::Stops { weights, .. } => {
+                    let widths = &mut work[half_widths[number].clone()];
+                    for (((weight, &mark), place), width) in
+                        weights.iter().zip(own).zip(places).zip(widths)
+                    {
+                        said += weight * around;
+                        *place -= weight * around;
+                        if mark != 0.0 {
+                            said += *place;
+                            *width = -mark * *place;
+                            *place = 0.0;
+                        }
+                    }
+                }
+            }
+            work[z.start + number] = said;
+            match &inner.sees {
+                Sees::Output(output) => work[y.start + output] += said,
+                Sees::Mixture { states, inputs } => {
+                    add(&mut self.x, said, states);
+                    add(&mut work[v.clone()], said, inputs);
+                }
+            }
+            (marks, plays) = (others, rest);
+        }
+    }
+
+    /// The displacement.
+    fn observe(&mut self, work: &mut [f64]) {
+        let Places { v, y, .. } = self.places;
+        for (output, c) in self.c.iter().enumerate() {
+            let said = work[y.start + output];
+            add(&mut self.x, said, c);
+            for input in v.clone() {
+                work[input] += self.d[(output, input - v.start)] * said;
+            }
+        }
+    }
+
+    /// What stood before the record.
+    fn stand(&mut self, work: &mut [f64]) {
+        let Places { v, states, .. } = self.places;
+        let mut first = 0;
+        for section in self.sections {
+            let order = section.order();
+            let standing = section.standing(&Matrix::identity(order, order));
+            let said = standing.tr_mul(&DVector::from_column_slice(&self.x[first..first + order]));
+            add(&mut work[states.start + first..][..order], 1.0, said.as_slice());
+            for (place, b) in v.clone().zip(&self.b) {
+                work[place] += dot(&b[first..first + order], said.as_slice());
+            }
+            first += order;
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn add(sum: &mut [f64], factor: f64, values: &[f64]) {
+    sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::linearization::Linearization;
+    use crate::identify::looped::{model, record, run};
+    use crate::identify::point::DynamicsFreedom;
+    use crate::identify::preparation::Prepared;
+    use crate::identify::sensitivity::{Derivatives, Parameters};
+
+    #[test]
+    fn gradient_is_the_one_that_all_derivatives_give() {
+        let model = model();
+        // one with a run-in from rest, and one that begins in motion and holds samples out
+        let runs = vec![run(1.5, 0.0, 130, vec![]), run(1.5, 0.3, 0, vec![300..420, 500..520])];
+        let record = record(&model, runs);
+        let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
+        let prepared = Prepared::scoring_all(&record, channels).unwrap();
+        let mut point = prepared.point_of(&model).unwrap();
+        point.dynamics.delay = 2;
+        point.pasts[1].state.iter_mut().enumerate().for_each(|(j, x)| *x = 0.1 * (j + 1) as f64);
+        let freedom = Freedom {
+            weights: true,
+            derivatives: Derivatives { thresholds: true, half_widths: true, starts: true },
+            identity: true,
+            dynamics: DynamicsFreedom::Everything,
+        };
+        let weighting = Weighting { outputs: vec![1.0, 0.4], turns: vec![0.8, f64::INFINITY] };
+        let record = &prepared.record;
+        let mut check = || Ok(());
+        let all = Linearization::new(&point, record, freedom, &weighting, &mut check).unwrap();
+        let layout = &all.layout;
+        let (found, cost) =
+            descent(&point, layout, freedom, &weighting, record, &mut check).unwrap();
+        let expected = all.descent();
+        assert!((cost / all.cost - 1.0).abs() < 1e-12);
+        assert!(expected.iter().filter(|value| value.abs() > 1e-6).count() > layout.len * 9 / 10);
+        for (i, (found, expected)) in found.iter().zip(expected.iter()).enumerate() {
+            let scale = (all.equations.gram[(i, i)] * all.cost).sqrt();
+            assert!((found - expected).abs() <= 1e-11 * scale, "{i}: {found} {expected}");
+        }
+    }
+}

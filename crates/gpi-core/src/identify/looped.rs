@@ -1,0 +1,76 @@
+//! A plant with every kind of thing in the loops around G and behind them, for tests.
+
+use crate::effects::{Backlash, Effect, InnerLoop, Law, OutputNonlinearity, Sees, Stiffness};
+use crate::linear::StateSpace;
+use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
+use crate::{Channel, Experiment, Matrix, Model, Record};
+use std::ops::Range;
+
+const STATES: usize = 3;
+
+fn stiffness() -> Stiffness {
+    let stops = |half_widths: [f64; 2]| Law::Stops {
+        half_widths: half_widths.to_vec(),
+        weights: vec![0.6, 1.0],
+    };
+    let mixture = Sees::Mixture { states: vec![0.8, -0.3, 0.4], inputs: vec![0.2, 0.1] };
+    let drives = |scale: f64| (1..=STATES).map(|j| scale / j as f64).collect();
+    Stiffness {
+        loops: vec![
+            InnerLoop { sees: mixture, law: stops([0.2, 0.7]), drives: drives(0.05) },
+            InnerLoop {
+                sees: Sees::Output(1),
+                law: Law::Power { exponent: 3, scale: 4.0 },
+                drives: drives(-0.02),
+            },
+            InnerLoop { sees: Sees::Output(0), law: stops([0.1, 0.5]), drives: drives(0.03) },
+        ],
+    }
+}
+
+/// Two inputs and two outputs, with every kind of thing in the loops and behind them.
+pub(super) fn model() -> Model {
+    let a = [0.6, 0.5, 0.1, -0.4, 0.5, 0.0, 0.0, 0.1, 0.7];
+    let linear = StateSpace::new(
+        Matrix::from_row_slice(STATES, STATES, &a),
+        Matrix::from_row_slice(STATES, 2, &[0.4, 0.1, 0.2, -0.3, 0.1, 0.5]),
+        Matrix::from_row_slice(2, STATES, &[1.0, 0.2, 0.3, -0.1, 0.7, 0.9]),
+        Matrix::from_row_slice(2, 2, &[0.1, 0.0, 0.05, 0.2]),
+    );
+    let channels = |name: &str| (0..2).map(|i| Channel::new(format!("{name}{i}"), "")).collect();
+    let hysteresis = (0..2).map(|input| {
+        let zones = Deadzones::new(vec![0.0, 0.4], vec![1.0, 0.3], Reading::OneSided).unwrap();
+        let widths = vec![0.0, 0.3 + 0.2 * f64::from(input)];
+        Gpi::new(zones, PlayBank::new(widths, vec![0.8, 0.4]).unwrap())
+    });
+    let (u, y) = (channels("u"), channels("y"));
+    let effects: [Effect; 3] = [
+        stiffness().into(),
+        Backlash { output: 1, half_width: 0.2 }.into(),
+        OutputNonlinearity { output: 1, coefficients: vec![0.1, -0.05], middle: 0.1, scale: 3.0 }
+            .into(),
+    ];
+    Model::new(100.0, u, y, hysteresis.collect(), linear.unwrap(), vec![0.0; 2])
+        .and_then(|model| model.with_effects(effects.to_vec()))
+        .unwrap()
+}
+
+/// An experiment of so much swing, from rest or in motion.
+pub(super) fn run(
+    swing: f64,
+    first: f64,
+    warmup: usize,
+    held_out: Vec<Range<usize>>,
+) -> Experiment {
+    let input = Matrix::from_fn(700, 2, |k, input| {
+        let t = k as f64 - if first == 0.0 { 20.0 } else { 0.0 };
+        let moved = (0.11 * t).sin() + 0.7 * (0.047 * t + input as f64).cos();
+        if t < 0.0 { 0.0 } else { first + swing * moved }
+    });
+    let output = Matrix::from_fn(700, 2, |k, o| swing * (0.2 * (k + 3 * o) as f64).sin());
+    Experiment { input, output, covariates: Matrix::zeros(700, 0), warmup, held_out }
+}
+
+pub(super) fn record(model: &Model, runs: Vec<Experiment>) -> Record {
+    Record::new(runs, 100.0, model.inputs().to_vec(), model.outputs().to_vec(), vec![]).unwrap()
+}
