@@ -21,9 +21,9 @@ def to_dict(found: Explanation) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``schema``, ``record``, ``noise_floor``, ``effects``, ``steps``, ``rejected``, ``error`` (before and
-        after, each train and holdout), ``residual`` (whether it is structured, and its tests), ``verdict``,
-        ``next_experiment``, ``interrupted``.
+        ``schema``, ``record``, ``noise_floor``, ``effects``, ``steps``, ``moved_resonance``, ``rejected``,
+        ``error`` (before and after, each train and holdout), ``residual`` (whether it is structured, and its
+        tests), ``verdict``, ``next_experiment``, ``interrupted``.
 
     Examples
     --------
@@ -54,6 +54,7 @@ def to_dict(found: Explanation) -> dict[str, Any]:
             }
             for step in found.steps
         ],
+        "moved_resonance": found.moved_resonance,
         "rejected": found.rejected,
         "error": {"before": found.before, "after": found.after},
         "residual": {
@@ -114,6 +115,14 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
         numbers = ", ".join(number(label, row) for label, row in list(step["parameters"].items())[:6])
         yield f"{name} ({'one more' if name in shown else names[name]}): {numbers}."
         shown.add(name)
+    if result["moved_resonance"]:
+        small, large = result["moved_resonance"]
+        yield (
+            f"A resonance at {frequency(small)} where the outputs swing {small['swing']:.3g}{space} rms "
+            f"is at {frequency(large)} where they swing {large['swing']:.3g}{space}. Hysteresis, or "
+            "whatever else acts on the input alone, cannot move a resonance: it is ruled out as the only "
+            "cause."
+        )
     for other in result["rejected"]:
         if other["confounded_with"]:
             yield f"{other['effect']} {other['why']}: this record cannot tell them apart."
@@ -140,6 +149,11 @@ def failed_in_words(tests: Iterable[Mapping[str, Any]]) -> Iterator[str]:
                 f"({test['statistic']:.3g} over {test['threshold']:.3g}), which points to "
                 f"{test['points_to']}{picture}."
             )
+
+
+def frequency(resonance: Mapping[str, float]) -> str:
+    """Return a resonance's frequency with its uncertainty."""
+    return f"{resonance['frequency']:.6g} ± {1.96 * resonance['std']:.2g} Hz"
 
 
 def number(label: str, row: Mapping[str, Any]) -> str:

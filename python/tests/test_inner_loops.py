@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 
 import gpi_hammerstein as gpi
 import oracle
+from gpi_hammerstein.explanation import in_words, to_dict
 from records import RATE, model_of
 
 SAMPLES = 500
+NOISE = 2e-3
 WIDTHS, WEIGHTS = [0.2, 0.5, 1.1], [0.4, -0.3, 1.0]
 SEEN_STATES, SEEN_INPUTS = np.array([0.8, -0.3, 0.5]), np.array([0.2, -0.4])
 DRIVES, CUBIC = np.array([0.05, -0.08, 0.04]), np.array([-0.004, 0.002, 0.001])
@@ -222,3 +224,55 @@ def test_stops_keep_a_stable_stage_bounded(gain, seed):
 def test_loops_that_do_not_fit_are_refused(loop, message):
     with pytest.raises((gpi.DataError, gpi.ParameterError), match=message):
         with_loops(model_of(plant()), loop)
+
+
+def multisine(samples: int, seed: int) -> np.ndarray:
+    """Two inputs, random phases, from rest."""
+    random = np.random.default_rng(seed)
+    lines = np.arange(1, samples // 5)
+    phases = random.uniform(0, 2 * np.pi, (len(lines), 2))
+    spectrum = np.zeros((samples // 2 + 1, 2), dtype=complex)
+    spectrum[lines] = np.exp(1j * phases)
+    u = np.fft.irfft(spectrum, samples, axis=0)
+    u *= np.minimum(np.arange(samples) / 30, 1)[:, None] / u.std(axis=0)
+    return np.vstack([np.zeros((12, 2)), u])
+
+
+@pytest.fixture(scope="module")
+def explained() -> gpi.Explanation:
+    """What a plant with stops around G lacks, driven at three swings."""
+    drives = [-0.06, 0.05, 0.01]
+    around = stops_loop(drives, [1.0, 0.0, 0.2], [0.0, 0.0], [0.3, 1.0, 2.5], [0.5, 0.7, 1.0])
+    model = with_loops(model_of(plant()), around)
+    inputs = [swing * multisine(2500, seed) for seed, swing in enumerate((0.3, 1.0, 3.0))]
+    random = np.random.default_rng(9)
+    outputs = [np.asarray(model.simulate(u)) + random.normal(0, NOISE, u.shape) for u in inputs]
+    record = gpi.Record(inputs, outputs, rate=RATE)
+    return gpi.explain(record, order=3, half_widths=[0.0, 0.4], thresholds=0)
+
+
+def test_hysteresis_inside_the_loop_is_named_first_and_explained(explained: gpi.Explanation) -> None:
+    assert explained.effects[0] == "stiffness"
+    assert explained.after["holdout"]["rms"] < 0.2 * explained.before["holdout"]["rms"]
+    assert len(explained.models) == len(explained.steps)
+
+
+def test_a_resonance_that_moves_with_the_swing_rules_the_input_out(explained: gpi.Explanation) -> None:
+    assert explained.moved_resonance is not None
+    small, large = explained.moved_resonance
+    assert large["swing"] > 5 * small["swing"]
+    # stops that slip no longer hold the displacement
+    moved = abs(large["frequency"] - small["frequency"])
+    assert moved > 5 * np.hypot(small["std"], large["std"])
+    words = " ".join(in_words(to_dict(explained)))
+    assert "cannot move a resonance" in words
+
+
+def test_a_resonance_stays_where_it_is_without_loops() -> None:
+    model = model_of(plant())
+    inputs = [swing * multisine(1500, seed) for seed, swing in enumerate((0.3, 1.0, 3.0))]
+    random = np.random.default_rng(9)
+    outputs = [np.asarray(model.simulate(u)) + random.normal(0, NOISE, u.shape) for u in inputs]
+    record = gpi.Record(inputs, outputs, rate=RATE)
+    found = gpi.explain(record, order=3, half_widths=[0.0, 0.4], thresholds=0, require=["stiffness"])
+    assert found.moved_resonance is None

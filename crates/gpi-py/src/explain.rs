@@ -115,6 +115,33 @@ impl Explanation {
         self.found.steps.iter().map(step).collect()
     }
 
+    /// The model as each step found it, in the order of ``steps``; all is refined together at last.
+    #[getter]
+    fn models(&self) -> Vec<Model> {
+        let model = |model: &gpi_core::Model| Model {
+            model: model.clone(),
+            identification: None,
+            refinement: None,
+        };
+        self.found.models.iter().map(model).collect()
+    }
+
+    /// A resonance that is elsewhere where the outputs swing more: rows of ``swing`` (rms of the outputs),
+    /// ``frequency`` and ``std`` (Hz) for the smallest and the largest swing; None where no loop was closed
+    /// around G, or no resonance moves.
+    #[getter]
+    fn moved_resonance<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<Bound<'py, PyDict>>>> {
+        let Some(pair) = &self.found.moved_resonance else { return Ok(None) };
+        let row = |one: &core::Resonance| {
+            let row = PyDict::new(py);
+            row.set_item("swing", one.swing)?;
+            row.set_item("frequency", one.frequency)?;
+            row.set_item("std", one.deviation)?;
+            Ok(row)
+        };
+        pair.iter().map(row).collect::<PyResult<_>>().map(Some)
+    }
+
     /// Effects that were tried and not taken: ``effect``, ``holdout_rms``, ``why``, ``confounded_with``.
     #[getter]
     fn rejected<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {

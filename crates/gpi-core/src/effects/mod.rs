@@ -17,6 +17,7 @@ mod hysteresis_shape;
 mod inner_loop;
 mod knots;
 mod linear_dynamics;
+mod loop_signals;
 mod outliers;
 mod output_nonlinearity;
 mod periodic_disturbance;

@@ -1,7 +1,7 @@
 //! A resonance that moves with amplitude.
 
+use super::loop_signals::{LoopSignal, families};
 use super::{Block, Candidate, InnerLoop, Law, Quantity, Sees, Situation, Stage, Units};
-use crate::Matrix;
 
 /// Loops around G: a restoring force that is not in proportion to the displacement acts inside the
 /// mechanics, `x+ = A x + B v + E w`, `w = law(S x + T v)`.
@@ -27,14 +27,16 @@ impl Stiffness {
         if situation.dynamics.order() < 2 {
             return Vec::new();
         }
-        match (situation.outputs().len(), situation.loops) {
-            (1, 0) => powers(situation),
-            (1, _) => Vec::new(),
-            (_, 0) => stops(situation, displaced(situation)),
-            // what the input does to the mechanics by itself
-            (_, loops) if loops <= situation.inputs().len() => stops(situation, driven(situation)),
-            _ => Vec::new(),
+        if situation.outputs().len() == 1 {
+            return if situation.loops == 0 { powers(situation) } else { Vec::new() };
         }
+        // one after the other, as long as each has something to explain
+        let mut loops = 0;
+        let next = families(situation).into_iter().find(|family| {
+            loops += family.len();
+            situation.loops < loops
+        });
+        next.map_or_else(Vec::new, |signals| stops(&signals, situation))
     }
 }
 
@@ -55,16 +57,16 @@ fn powers(situation: &Situation) -> Vec<Candidate> {
     [order..2 * order, 0..2 * order].map(|places| Candidate::linear(block.clone(), places)).to_vec()
 }
 
-/// Stops of these signals, which come with their root mean squares.
-fn stops(situation: &Situation, signals: Vec<(Sees, f64)>) -> Vec<Candidate> {
+/// Stops of these signals.
+fn stops(signals: &[LoopSignal], situation: &Situation) -> Vec<Candidate> {
     /// Half-widths over the root mean square.
     const HALF_WIDTHS: [f64; 3] = [0.15, 0.5, 1.5];
     let order = situation.dynamics.order();
-    let moving = signals.into_iter().filter(|(_, rms)| *rms > 0.0);
-    let inner = moving.map(|(sees, rms)| InnerLoop {
-        sees,
+    let moving = signals.iter().filter(|signal| signal.rms() > 0.0);
+    let inner = moving.map(|signal| InnerLoop {
+        sees: signal.sees(),
         law: Law::Stops {
-            half_widths: HALF_WIDTHS.map(|r| r * rms).to_vec(),
+            half_widths: HALF_WIDTHS.map(|r| r * signal.rms()).to_vec(),
             weights: vec![1.0; HALF_WIDTHS.len()],
         },
         drives: vec![0.0; order],
@@ -77,47 +79,6 @@ fn stops(situation: &Situation, signals: Vec<(Sees, f64)>) -> Vec<Candidate> {
         first += values_of(inner);
     }
     if places.is_empty() { Vec::new() } else { vec![Candidate::linear(block, places)] }
-}
-
-/// The v that would hold each displacement still: `G(1)^-1 (C x + D v)`.
-fn displaced(situation: &Situation) -> Vec<(Sees, f64)> {
-    /// Combinations of outputs with less gain than this part of the largest are not seen.
-    const RANK: f64 = 1e-6;
-    let dynamics = situation.dynamics;
-    let dc = dynamics.dc_gain();
-    let Ok(inverse) = dc.clone().pseudo_inverse(RANK * dc.norm()) else { return Vec::new() };
-    let states = &inverse * dynamics.c();
-    let inputs = &inverse * &dynamics.d;
-    let row = |matrix: &Matrix, i: usize| matrix.row(i).iter().copied().collect::<Vec<f64>>();
-    let rms = |i: usize| {
-        let own = situation.displacements.iter().map(|y| y * inverse.row(i).transpose());
-        root_mean_square(own.collect::<Vec<_>>().iter().flat_map(|z| z.iter().copied()))
-    };
-    let sees = |i| Sees::Mixture { states: row(&states, i), inputs: row(&inputs, i) };
-    situation.inputs().map(|i| (sees(i), rms(i))).collect()
-}
-
-/// Each v.
-fn driven(situation: &Situation) -> Vec<(Sees, f64)> {
-    let count = situation.inputs().len();
-    let sees = |input: usize| Sees::Mixture {
-        states: vec![0.0; situation.dynamics.order()],
-        inputs: (0..count).map(|other| f64::from(u8::from(other == input))).collect(),
-    };
-    let rms = |input: usize| {
-        let own = situation.intermediates.iter();
-        root_mean_square(own.flat_map(|v| v.column(input).iter().copied().collect::<Vec<_>>()))
-    };
-    situation.inputs().map(|input| (sees(input), rms(input))).collect()
-}
-
-/// Without the mean.
-fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
-    let (count, sum, squares) = values.fold((0.0, 0.0, 0.0), |(count, sum, squares), value| {
-        (count + 1.0, sum + value, squares + value * value)
-    });
-    let mean: f64 = sum / f64::max(count, 1.0);
-    (squares / f64::max(count, 1.0) - mean * mean).max(0.0).sqrt()
 }
 
 /// How many values a loop has.
@@ -202,11 +163,16 @@ impl Block for Stiffness {
             };
             bounds.extend(free(inner.drives.len() + seen));
             if let Law::Stops { half_widths, weights } = &inner.law {
+                /// Of the logarithms: beyond a thousandth of the widest stop, or a thousand times it, the
+                /// others are stops no longer.
+                const REACH: f64 = 6.9;
                 // the widest stop sets the scales of z and of w
                 let held = |last: Option<f64>| last.map(|value| (value, value));
+                let widest = half_widths.last().map(|r| r.ln());
                 let others = half_widths.len().saturating_sub(1);
-                bounds.extend(free(others));
-                bounds.extend(held(half_widths.last().map(|r| r.ln())));
+                let near = widest.map(|widest| (widest - REACH, widest + REACH));
+                bounds.extend(near.into_iter().cycle().take(others));
+                bounds.extend(held(widest));
                 bounds.extend(free(others));
                 bounds.extend(held(weights.last().copied()));
             }

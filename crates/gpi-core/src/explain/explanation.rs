@@ -4,7 +4,7 @@ use super::noise;
 use super::residual;
 use super::search::{Round, Search};
 use super::verdict::{self, NextExperiment, Verdict};
-use super::{Rejected, ResidualTest};
+use super::{Rejected, ResidualTest, Resonance};
 use crate::effects::Effect;
 use crate::identify::point::Point;
 use crate::identify::residuals_from_fitted_start;
@@ -57,6 +57,8 @@ pub struct Explanation {
     pub effects: Vec<&'static str>,
     /// The declared model, then every effect that was added.
     pub steps: Vec<Step>,
+    /// The model as each step found it; all is refined together at last.
+    pub models: Vec<Model>,
     /// Effects that were tried and not taken.
     pub rejected: Vec<Rejected>,
     /// Errors of the declared model.
@@ -65,6 +67,9 @@ pub struct Explanation {
     pub after: Errors,
     /// Tests of what is left.
     pub tests: Vec<ResidualTest>,
+    /// A resonance that is elsewhere where the outputs swing more, with the smallest swing and with the largest:
+    /// where loops were closed around G, what rules out that the input's side alone is wrong.
+    pub moved_resonance: Option<[Resonance; 2]>,
     /// What it comes to.
     pub verdict: Verdict,
     /// What to measure next, when that would tell more.
@@ -115,6 +120,9 @@ pub(super) fn summarise(
     steps.extend(search.rounds.iter().map(|round| added(round, &search, values)));
     steps.extend(noise.iter().map(|effect| of_noise(effect, &after)));
     describe(&mut steps, &search.point, &refinement, &noise, &model)?;
+    let found = |round: &Round| round.trial.point.to_model(record, mended, means);
+    let mut models = vec![base.clone()];
+    models.extend(search.rounds.iter().map(found).collect::<Result<Vec<_>, _>>()?);
     let mut effects: Vec<&'static str> = Vec::new();
     for name in steps.iter().filter(|s| !s.parameters.is_empty()).filter_map(|s| s.effect) {
         if !effects.contains(&name) {
@@ -124,6 +132,7 @@ pub(super) fn summarise(
     let mut all = model.effects().to_vec();
     all.extend(noise);
     model = model.with_effects(all)?;
+    models.resize(steps.len(), model.clone());
     let mut rejected = search.last.clone();
     rejected.extend(search.rounds.iter().flat_map(|round| round.others.iter().cloned()));
     rejected.retain(|one| !effects.contains(&one.effect));
@@ -136,10 +145,12 @@ pub(super) fn summarise(
         refinement,
         effects,
         steps,
+        models,
         rejected,
         before,
         after,
         tests,
+        moved_resonance: None,
         verdict,
         residuals_before,
         residuals_after,

@@ -14,6 +14,7 @@ mod concurrently;
 mod explanation;
 mod grid;
 mod lags;
+mod moved_resonance;
 mod noise;
 mod ranking;
 mod residual;
@@ -32,6 +33,7 @@ use crate::spectrum::is_one_sine;
 use crate::{Error, Matrix, Record};
 use explanation::summarise;
 pub use explanation::{Errors, Explanation, Step};
+pub use moved_resonance::Resonance;
 pub use residual::{ResidualOptions, ResidualTest, residual_tests};
 use search::Search;
 pub use trial::Rejected;
@@ -88,7 +90,8 @@ pub fn explain(
     refined.drop_undetermined(&prepared, progress)?;
     let base = refined.fitted.point.clone();
     let order_is_given = identify.order.is_some() || identify.delay.is_some();
-    let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_)));
+    // none at all is a grid too
+    let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_) | Grid::Count(0)));
     let moving = RefineOptions {
         thresholds: !given(&identify.thresholds),
         half_widths: !given(&identify.half_widths),
@@ -104,7 +107,15 @@ pub fn explain(
     let mut patient = |_: &str, _: f64| true;
     let last: Progress = if interrupted { &mut patient } else { progress };
     let refinement = finish(&mut search, interrupted, last)?;
-    summarise(record, holdout, &base, search, refinement, interrupted)
+    // what rules out that the input's side alone is wrong
+    let is_inside = search.point.loops().next().is_some();
+    let moved_resonance = if is_inside && !interrupted {
+        moved_resonance::moved_resonance(&base, &search.prepared, &search.options, last)?
+    } else {
+        None
+    };
+    let found = summarise(record, holdout, &base, search, refinement, interrupted)?;
+    Ok(Explanation { moved_resonance, ..found })
 }
 
 /// Whether a search ended because it was to stop: what it has found so far stands.

@@ -4,7 +4,8 @@ use super::score::{Base, Score, scores};
 use super::search::Search;
 use crate::Error;
 use crate::effects::{Candidate, Entry};
-use crate::identify::point::Point;
+use crate::identify::point::{Layout, Point};
+use crate::identify::representatives::representatives;
 use crate::identify::{Progress, report};
 
 /// The best candidate of a family.
@@ -42,8 +43,13 @@ impl Search<'_> {
             "stiffness",
         ];
         let Self { prepared, options, .. } = self;
-        let base = Base::new(point, &prepared.record, options.freedom, &options.weighting)?;
-        let values = prepared.values();
+        let record = &prepared.record;
+        let unknowns = Layout::new(point, options.freedom).len;
+        let few = representatives(point, record, unknowns);
+        let alone = few.map(|few| few.alone(point, record)).transpose()?;
+        let (point, record) = alone.as_ref().map_or((point, record), |(p, r)| (p, r));
+        let base = Base::new(point, record, options.freedom, &options.weighting)?;
+        let values = (record.scored() * record.outputs().len()) as f64;
         let present = |entry: &Entry| point.effects.iter().any(|e| e.name() == entry.name);
         // G of any order takes a delay for itself
         let of_use = |entry: &Entry| entry.name != "delay" || self.order_is_given;

@@ -175,9 +175,12 @@ impl<'a> Search<'a> {
         const ROUNDS: usize = 6;
         /// The part of the residual's squares below which a round is the last.
         const SMALL: f64 = 0.02;
+        self.is_rich = true;
+        if !self.moving.half_widths && !self.moving.thresholds {
+            return Ok(false);
+        }
         let values = self.prepared.values();
         let mut gained = false;
-        self.is_rich = true;
         for round in 0..ROUNDS {
             report(progress, "finer grid", round as f64 / ROUNDS as f64)?;
             let (point, added) = enriched(&self.base()?, &self.prepared, &self.moving)?;

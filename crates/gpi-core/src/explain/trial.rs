@@ -114,12 +114,16 @@ impl Search<'_> {
     pub(super) fn start(&self, base: &Point, score: Score) -> Result<Point, Error> {
         /// The start is worse than `base` by this factor of the squares.
         const BEYOND: f64 = 10.0;
+        /// The same where plays go around with the output: a start that is worse than none leads elsewhere.
+        const BEYOND_PLAYS: f64 = 1.0;
         let start = base.with_effect(score.start.clone());
         let Some(zero) = score.zero else { return Ok(start) };
         let block = score.start.block();
         let mut limits = block.values().into_iter().zip(block.bounds());
         let is_sensible = limits.all(|(value, (low, high))| low <= value && value <= high);
-        let is_near = self.training_squares(&start)? <= BEYOND * self.training_squares(base)?;
+        let has_plays = block.loops().iter().any(|inner| inner.law.stops() > 0);
+        let beyond = if has_plays { BEYOND_PLAYS } else { BEYOND };
+        let is_near = self.training_squares(&start)? <= beyond * self.training_squares(base)?;
         Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })
     }
 
@@ -152,7 +156,7 @@ impl Search<'_> {
         let mut chance = white.max(LEAST * values);
         if deviance > chance {
             let refined = Refined { fitted, options, outliers: 0, robust: false };
-            let uncertainty = refined.uncertainty(&self.prepared, progress)?;
+            let uncertainty = refined.uncertainty(&self.prepared.record, progress)?;
             let colour = uncertainty.used / uncertainty.estimated.max(1) as f64;
             chance = chance.max(colour * white);
         }

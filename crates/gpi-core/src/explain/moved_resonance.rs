@@ -1,0 +1,96 @@
+//! A resonance that moves with the swing: nothing in front of G can do that.
+
+use crate::identify::Progress;
+use crate::identify::levenberg_marquardt::{FitOptions, fit};
+use crate::identify::point::Point;
+use crate::identify::preparation::Prepared;
+use crate::identify::refine::Refined;
+use crate::identify::representatives::Representatives;
+use crate::linear::Section;
+use crate::{Error, Experiment, Record};
+use std::f64::consts::TAU;
+
+/// Where a resonance of the dynamics is at one swing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resonance {
+    /// Root mean square of the outputs.
+    pub swing: f64,
+    /// In Hz, from the angle of the pole.
+    pub frequency: f64,
+    /// Standard deviation of the frequency.
+    pub deviation: f64,
+}
+
+/// The resonance that differs most surely between the experiments of smallest and largest swing, there and
+/// here; `None` where the swings are alike, or no resonance differs by more than chance.
+///
+/// The model without loops is fitted to each of the two experiments by itself. A hysteresis or any other
+/// effect on the input changes v, and with it the response; the poles of G stay where they are.
+pub(super) fn moved_resonance(
+    base: &Point,
+    prepared: &Prepared,
+    options: &FitOptions,
+    progress: Progress,
+) -> Result<Option<[Resonance; 2]>, Error> {
+    /// Largest over smallest swing.
+    const APART: f64 = 1.25;
+    /// Standard deviations by which a resonance must differ.
+    const SURE: f64 = 5.0;
+    let record = &prepared.record;
+    let swings: Vec<f64> = record.experiments().iter().map(swing).collect();
+    let mut order: Vec<usize> = (0..swings.len()).collect();
+    order.sort_by(|&a, &b| swings[a].total_cmp(&swings[b]));
+    let (Some(&least), Some(&most)) = (order.first(), order.last()) else { return Ok(None) };
+    if swings[most] < APART * swings[least] {
+        return Ok(None);
+    }
+    let small = resonances(base, record, least, swings[least], options, progress)?;
+    let large = resonances(base, record, most, swings[most], options, progress)?;
+    let sureness = |pair: &[Resonance; 2]| {
+        let [a, b] = pair;
+        (a.frequency - b.frequency).abs() / a.deviation.hypot(b.deviation)
+    };
+    let pairs = small.into_iter().zip(large).filter_map(|(a, b)| Some([a?, b?]));
+    let surest = pairs.max_by(|a, b| sureness(a).total_cmp(&sureness(b)));
+    Ok(surest.filter(|pair| sureness(pair) > SURE))
+}
+
+fn swing(experiment: &Experiment) -> f64 {
+    let values = experiment.scored() * experiment.output.ncols();
+    let rows = experiment.scored_rows(&experiment.output);
+    (rows.map(|rows| rows.norm_squared()).sum::<f64>() / values as f64).sqrt()
+}
+
+/// Where each section of G resonates in one experiment; `None` for those that do not.
+fn resonances(
+    base: &Point,
+    record: &Record,
+    experiment: usize,
+    swing: f64,
+    options: &FitOptions,
+    progress: Progress,
+) -> Result<Vec<Option<Resonance>>, Error> {
+    const STEPS: usize = 8;
+    let one = Representatives { experiments: vec![experiment], ratio: 1.0, memory: 0, stride: 1 };
+    let (point, record) = one.alone(base, record)?;
+    let options = FitOptions { steps: STEPS, gain: 1e-4, ..options.clone() };
+    let fitted = fit(point, &record, &options, "dynamics at each swing", progress)?;
+    let (point, layout) = (fitted.point.clone(), fitted.linearization.layout.clone());
+    let refined = Refined { fitted, options, outliers: 0, robust: false };
+    let uncertainty = refined.uncertainty(&record, progress)?;
+    let rate = record.rate();
+    let frequencies = |point: &Point| -> Vec<f64> {
+        let own = point.dynamics.own();
+        let sections = own.sections.iter();
+        sections.map(|section| section.poles()[0].arg().abs() * rate / TAU).collect()
+    };
+    let deviations = uncertainty
+        .spread(&layout.values(&point), |step| Ok(frequencies(&point.moved(step, &layout))))?;
+    let own = point.dynamics.own();
+    let found = frequencies(&point).into_iter().zip(deviations).zip(&own.sections);
+    let resonance = |((frequency, deviation), section): ((f64, f64), &Section)| {
+        let resonates = section.order() == 2 && section.poles()[0].im != 0.0;
+        resonates.then_some(Resonance { swing, frequency, deviation })
+    };
+    Ok(found.map(resonance).collect())
+}
