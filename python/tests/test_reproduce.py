@@ -1,13 +1,18 @@
-"""The paper's example against reference figures that were computed apart from this package."""
+"""The paper's example against reference figures computed apart from this package, and a benchmark."""
 
+import hashlib
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import gpi_hammerstein as gpi
+from data_folder import MEASURED, needs_measured
 from gpi_hammerstein.cli import run
-from gpi_hammerstein.reproduce import Paper, paper
+from gpi_hammerstein.reproduce.benchmark_data import fetch
+from gpi_hammerstein.reproduce.paper import Paper, paper
+from gpi_hammerstein.reproduce.steering_mirror import NAME
 
 # reading: taps; then order 2 and 3: G, v-hat
 REFERENCE = {
@@ -64,3 +69,46 @@ def test_the_command_prints_and_draws_it(tmp_path: Path, capsys: pytest.CaptureF
     pictures = [name for name in result["files"] if name.endswith(".png")]
     assert len(pictures) == 15
     assert all((out / name).stat().st_size > 5000 for name in pictures)
+
+
+def test_files_are_fetched_once_and_checked(tmp_path: Path) -> None:
+    (tmp_path / "public").mkdir()
+    (tmp_path / "public" / "u.npy").write_bytes(b"measured")
+    address = (tmp_path / "public").as_uri() + "/"
+    digest = hashlib.sha256(b"measured").hexdigest()
+    folder = tmp_path / "kept"
+    assert fetch(address, {"u.npy": digest}, folder) == [folder / "u.npy"]
+    (tmp_path / "public" / "u.npy").unlink()
+    assert fetch(address, {"u.npy": digest}, folder)[0].read_bytes() == b"measured"
+    with pytest.raises(gpi.DataError, match="u.npy: not the published file"):
+        fetch(address, {"u.npy": "0" * 64}, folder)
+    with pytest.raises(gpi.DataError, match=r"cannot be fetched .* put y.npy into .*kept yourself"):
+        fetch(address, {"y.npy": digest}, folder)
+
+
+def test_a_file_that_is_not_the_published_one_is_not_kept(tmp_path: Path) -> None:
+    (tmp_path / "u.npy").write_bytes(b"an error page")
+    with pytest.raises(gpi.DataError, match="not the published file"):
+        fetch(tmp_path.as_uri() + "/", {"u.npy": "0" * 64}, tmp_path / "kept")
+    assert not (tmp_path / "kept").exists()
+
+
+@needs_measured
+def test_the_steering_mirror_lacks_stiffness(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    options = ["--order", "12", "--realisations", "1", "--data", str(MEASURED / NAME)]
+    assert run(["reproduce", "fsm", *options, "-o", str(out), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["explanation"]["effects"][0] == "stiffness"
+    first, *_, last = (stage["error_percent"] for stage in result["stages"])
+    assert last["300"] < 0.8 * first["300"]
+    assert sorted(file.name for file in out.iterdir()) == result["files"]
+    assert {"frequency_response_before.png", "frequency_response_after.png"} <= set(result["files"])
+
+
+@needs_measured
+def test_the_command_for_the_steering_mirror_refuses_other_amplitudes(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["reproduce", "fsm", "--levels", "100,150"]) == 2
+    assert "amplitudes in mV out of [100, 200, 300]" in capsys.readouterr().err

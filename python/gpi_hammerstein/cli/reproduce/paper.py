@@ -6,26 +6,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import typer
 from rich.table import Table
 
 from gpi_hammerstein import files
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import console, picture, print_json, say_written, working, write_json
-from gpi_hammerstein.reproduce import PERIOD, Paper, ReadingResult, paper, response
+from gpi_hammerstein.reproduce.paper import PERIOD, Paper, ReadingResult, paper, response
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-reproduce = typer.Typer(no_args_is_help=True, help="Run published examples again.")
 
-
-@reproduce.callback()
-def _examples() -> None:
-    """Run published examples again."""
-
-
-@reproduce.command("paper")
 def paper_command(out: options.Out = None, as_json: options.Json = False) -> None:
     """Run the numerical example of the source paper, its figures 3 to 6.
 

@@ -1,0 +1,1 @@
+"""Published examples and benchmarks, run again."""
