@@ -119,7 +119,10 @@ def run(pool: Executor, work: Iterable[Job], kept: Kept) -> list[Result]:
 
 def as_markdown(tables: Iterable[score_tables.Table]) -> str:
     """Return the tables below the command that made them."""
-    command = shlex.join(["python", "tools/scoreboard.py", *sys.argv[1:]])
+    words = iter(sys.argv[1:])
+    # where results are kept changes none of them
+    told = [word for word in words if word != "--keep" or next(words) is None]
+    command = shlex.join(["python", "tools/scoreboard.py", *told])
     return "\n".join([f"# Scoreboard\n\nMade by `{command}`.\n", *(table.markdown() for table in tables)])
 
 
