@@ -101,7 +101,9 @@ def test_the_steering_mirror_lacks_stiffness(tmp_path: Path, capsys: pytest.Capt
     result = json.loads(capsys.readouterr().out)
     assert result["explanation"]["effects"][0] == "stiffness"
     first, *_, last = (stage["error_percent"] for stage in result["stages"])
-    assert last["300"] < 0.8 * first["300"]
+    # twelve states leave most of what three amplitudes share unmodelled
+    assert all(last[level] < 0.95 * first[level] for level in ("100", "200", "300"))
+    assert last["100"] < 0.7 * first["100"]
     assert sorted(file.name for file in out.iterdir()) == result["files"]
     assert {"frequency_response_before.png", "frequency_response_after.png"} <= set(result["files"])
 

@@ -83,7 +83,9 @@ pub(crate) fn fit(
     let mut point = point;
     let mut current = linearize(&point, 0, progress)?;
     let mut history = vec![current.cost];
-    let (mut damping, mut growth) = (1e-4_f64, 2.0);
+    // a curvature of few experiments promises too much in directions that these hardly move
+    let mut damping: f64 = if current.is_of_few() { 1e-2 } else { 1e-4 };
+    let mut growth = 2.0;
     let mut status = Status::Limit;
     // What rounding leaves of the outputs' squares.
     let outputs = record.experiments().iter().flat_map(|e| e.output.column_iter().enumerate());

@@ -143,6 +143,11 @@ impl Linearization {
         Ok(near)
     }
 
+    /// Whether the curvature is that of a few experiments.
+    pub(crate) fn is_of_few(&self) -> bool {
+        self.age.is_some()
+    }
+
     /// Whether the curvature is that of an earlier point.
     pub(crate) fn is_old(&self) -> bool {
         self.age.is_some_and(|age| age > 0)
