@@ -261,6 +261,21 @@ impl Experiment {
         starts.zip(ends).filter(|(start, end)| start < end).map(|(start, end)| start..end)
     }
 
+    /// The same with one of so many parts of its scored samples scored, equal but for rounding.
+    pub(crate) fn part(&self, number: usize, parts: usize) -> Self {
+        let places: Vec<usize> = self.scored_runs().flatten().collect();
+        let bound = |number: usize| number * places.len() / parts;
+        let own = &places[bound(number)..bound(number + 1)];
+        let (Some(first), Some(last)) = (own.first(), own.last()) else { return self.clone() };
+        let mut part = self.clone();
+        let inside = |held: &Range<usize>| *first < held.start && held.end <= *last;
+        part.held_out.retain(inside);
+        part.held_out.insert(0, self.warmup..*first);
+        part.held_out.push(last + 1..self.input.nrows());
+        part.held_out.retain(|held| !held.is_empty());
+        part
+    }
+
     /// The scored rows of a signal (samples, channels), run by run.
     pub(crate) fn scored_rows<'a>(
         &self,

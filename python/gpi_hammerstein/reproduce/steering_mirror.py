@@ -37,6 +37,8 @@ RATE = 6400.0
 MICRO = 1e6
 LEVELS = (100, 200, 300)
 HELD_OUT = 5
+# Samples of the first period before the second one: the modes forget in a tenth of it.
+LEAD = 2048
 # Modes up to 3 kHz, of three inputs and three outputs.
 ORDER = 44
 # One model for all amplitudes, relative errors in % at each of them.
@@ -133,10 +135,10 @@ def steering_mirror(
     levels = read(folder or local_folder(NAME))
     own = [level for level in levels if level.millivolts in fitted]
     record = Record(
-        [u for level in own for u in level.inputs[:realisations]],
-        [y for level in own for y in level.outputs[:realisations]],
+        [u[level.period - LEAD :] for level in own for u in level.inputs[:realisations]],
+        [y[level.period - LEAD :] for level in own for y in level.outputs[:realisations]],
         rate=RATE,
-        warmup=own[0].period,
+        warmup=LEAD,
         input_units=["V"] * 3,
         output_units=["um"] * 3,
     )

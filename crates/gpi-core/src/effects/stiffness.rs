@@ -166,14 +166,21 @@ impl Block for Stiffness {
                 /// Of the logarithms: beyond a thousandth of the widest stop, or a thousand times it, the
                 /// others are stops no longer.
                 const REACH: f64 = 6.9;
+                /// How far a step may take a logarithm or a weight.
+                const STEP: f64 = 0.7;
+                let near = |value: f64| (value - STEP, value + STEP);
                 // the widest stop sets the scales of z and of w
                 let held = |last: Option<f64>| last.map(|value| (value, value));
                 let widest = half_widths.last().map(|r| r.ln());
                 let others = half_widths.len().saturating_sub(1);
-                let near = widest.map(|widest| (widest - REACH, widest + REACH));
-                bounds.extend(near.into_iter().cycle().take(others));
+                let width = |r: &f64| {
+                    let (low, high) = near(r.ln());
+                    let scale = widest.unwrap_or(0.0);
+                    (low.max(scale - REACH), high.min(scale + REACH))
+                };
+                bounds.extend(half_widths.iter().take(others).map(width));
                 bounds.extend(held(widest));
-                bounds.extend(free(others));
+                bounds.extend(weights.iter().take(others).map(|weight| near(*weight)));
                 bounds.extend(held(weights.last().copied()));
             }
         }

@@ -71,7 +71,8 @@ fn resonances(
     progress: Progress,
 ) -> Result<Vec<Option<Resonance>>, Error> {
     const STEPS: usize = 8;
-    let one = Representatives { experiments: vec![experiment], ratio: 1.0, memory: 0, stride: 1 };
+    let whole = record.experiments()[experiment].clone();
+    let one = Representatives { experiments: vec![(experiment, whole)], ratio: 1.0, memory: 0 };
     let (point, record) = one.alone(base, record)?;
     let options = FitOptions { steps: STEPS, gain: 1e-4, ..options.clone() };
     let fitted = fit(point, &record, &options, "dynamics at each swing", progress)?;

@@ -31,7 +31,7 @@ pub(crate) fn scores(
     check: &mut dyn FnMut(f64) -> Result<(), Error>,
 ) -> Result<Vec<Score>, Error> {
     /// Numbers that the columns held at once may take.
-    const AT_ONCE: usize = 6_000_000;
+    const AT_ONCE: usize = 12_000_000;
     let columns = (AT_ONCE / base.record.samples().max(1)).max(1);
     let mut scores = Vec::new();
     while let Some(first) = candidates.get(scores.len()) {

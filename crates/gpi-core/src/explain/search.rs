@@ -3,14 +3,16 @@
 use super::concurrently::concurrently;
 use super::grid::enriched;
 use super::lags::Before;
+use super::ranking::Ranked;
 use super::score::Base;
 use super::trial::{LEAST, Rejected, Trial, is_confirmed};
 use crate::effects::{CATALOGUE, Entry};
 use crate::identify::NoiseFloor;
 use crate::identify::levenberg_marquardt::{FitOptions, fit};
-use crate::identify::point::Point;
+use crate::identify::point::{Layout, Point};
 use crate::identify::preparation::Prepared;
 use crate::identify::refine::{RefineOptions, Refined, settings};
+use crate::identify::representatives::representatives;
 use crate::identify::{Progress, report};
 use crate::spectrum::is_one_sine;
 use crate::{Error, Record};
@@ -124,7 +126,7 @@ impl<'a> Search<'a> {
         }
         let before = self.held_out(&self.point)?;
         ranked.truncate(FITTED);
-        let mut trials = concurrently(ranked, progress, |one, progress| self.trial(one, progress))?;
+        let mut trials = self.trials(ranked, progress)?;
         // what is explained, less what so many parameters would by chance
         trials.sort_by(|a, b| (b.deviance - b.chance).total_cmp(&(a.deviance - a.chance)));
         let floor = self.floor()?;
@@ -133,8 +135,12 @@ impl<'a> Search<'a> {
             let takes = |part: f64, after: f64, before: f64| after < (1.0 - part) * before;
             let is_substantial = takes(SUBSTANTIAL, trial.cost, self.cost)
                 && takes(HELD_OUT, sum(&trial.held_out), sum(&before));
+            let name = trial.entry.name;
+            // more of what is named already is no new name
+            let is_named =
+                trial.entry.driven && self.point.effects.iter().any(|effect| effect.name() == name);
             let is_weighty =
-                is_substantial || trial.cost < NEAR * floor || SIGNED.contains(&trial.entry.name);
+                is_substantial || is_named || trial.cost < NEAR * floor || SIGNED.contains(&name);
             let is_more = trial.is_driven && trial.deviance > trial.chance;
             is_more && is_weighty && is_confirmed(&before, &trial.held_out)
         };
@@ -166,6 +172,27 @@ impl<'a> Search<'a> {
         self.rearrange(progress)?;
         self.backward(progress)?;
         Ok(true)
+    }
+
+    /// Fits candidates; where fits take long, only those that may come near the best so far.
+    fn trials(&self, ranked: Vec<Ranked>, progress: Progress) -> Result<Vec<Trial>, Error> {
+        /// Part of what the best has gained that a score test must promise: it promises too little, but not
+        /// by more.
+        const NEAR: f64 = 0.5;
+        let record = &self.prepared.record;
+        let unknowns = Layout::new(&self.point, self.options.freedom).len;
+        if representatives(&self.point, record, unknowns).is_none() {
+            return concurrently(ranked, progress, |one, progress| self.trial(one, progress));
+        }
+        let mut trials: Vec<Trial> = Vec::new();
+        for one in ranked {
+            let promised = -self.prepared.values() * (1.0 - one.score.gain).max(1e-300).ln();
+            let best = trials.iter().map(|trial| trial.deviance).fold(0.0, f64::max);
+            if promised >= NEAR * best {
+                trials.push(self.trial(one, progress)?);
+            }
+        }
+        Ok(trials)
     }
 
     /// Moves half-widths and thresholds, and takes finer grids as long as they pay: what the declared model

@@ -8,6 +8,7 @@ use crate::identify::Progress;
 use crate::identify::levenberg_marquardt::{FitOptions, Fitted, Status, fit};
 use crate::identify::point::{Layout, Point};
 use crate::identify::refine::Refined;
+use crate::identify::representatives::representatives;
 use crate::linear::Section;
 use crate::{Error, Record};
 
@@ -154,7 +155,11 @@ impl Search<'_> {
         let deviance = values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln();
         let white = added.max(1) as f64 * values.ln() + 2.0 * LOOKS.ln();
         let mut chance = white.max(LEAST * values);
-        if deviance > chance {
+        /// What no colour makes chance of.
+        const BEYOND_COLOUR: f64 = 50.0;
+        let few = representatives(&point, &self.prepared.record, length(&point));
+        let is_certain = few.is_some() && deviance > BEYOND_COLOUR * white;
+        if deviance > chance && !is_certain {
             let refined = Refined { fitted, options, outliers: 0, robust: false };
             let uncertainty = refined.uncertainty(&self.prepared.record, progress)?;
             let colour = uncertainty.used / uncertainty.estimated.max(1) as f64;

@@ -1,15 +1,72 @@
 //! Arithmetic on the changes of several unknowns side by side.
 
 use crate::effects::Law;
+use pulp::Simd;
 
 /// Unknowns that run side by side: what the widest vectors of today's processors hold.
 pub(super) const LANES: usize = 8;
 pub(super) type Lanes = [f64; LANES];
 pub(super) const NONE: Lanes = [0.0; LANES];
 
+/// Rows of numbers that weigh the same values, four rows beside each other.
+pub(super) struct Weights {
+    /// Of each four rows, by columns; rows of zeros at the end.
+    blocks: Vec<Vec<[f64; BLOCK]>>,
+}
+
+const BLOCK: usize = 4;
+
+impl Weights {
+    pub(super) fn new(rows: &[&[f64]]) -> Self {
+        let columns = rows.first().map_or(0, |row| row.len());
+        let block = |rows: &[&[f64]]| {
+            let column = |j: usize| std::array::from_fn(|i| rows.get(i).map_or(0.0, |row| row[j]));
+            (0..columns).map(column).collect()
+        };
+        Self { blocks: rows.chunks(BLOCK).map(block).collect() }
+    }
+
+    /// Adds to each sum what its row makes of the values, which belong to the columns from `first` on.
+    #[inline(always)]
+    pub(super) fn gather<S: Simd>(
+        &self,
+        simd: S,
+        sums: &mut [Lanes],
+        first: usize,
+        values: &[Lanes],
+    ) {
+        for (sums, block) in sums.chunks_mut(BLOCK).zip(&self.blocks) {
+            let mut own = [NONE; BLOCK];
+            for (weights, value) in block[first..].iter().zip(values) {
+                for (sum, weight) in own.iter_mut().zip(weights) {
+                    add(simd, sum, *weight, value);
+                }
+            }
+            for (sum, own) in sums.iter_mut().zip(&own) {
+                add(simd, sum, 1.0, own);
+            }
+        }
+    }
+
+    /// Adds to each sum, one for each column, what its column makes of the values.
+    #[inline(always)]
+    pub(super) fn scatter<S: Simd>(&self, simd: S, sums: &mut [Lanes], values: &[Lanes]) {
+        for (values, block) in values.chunks(BLOCK).zip(&self.blocks) {
+            let mut own = [NONE; BLOCK];
+            own.iter_mut().zip(values).for_each(|(own, value)| *own = *value);
+            for (sum, weights) in sums.iter_mut().zip(block) {
+                for (weight, value) in weights.iter().zip(&own) {
+                    add(simd, sum, *weight, value);
+                }
+            }
+        }
+    }
+}
+
 /// How a change of z and of the logarithms of half-widths shows in w.
 #[inline(always)]
-pub(super) fn pass(
+pub(super) fn pass<S: Simd>(
+    simd: S,
     law: &Law,
     z: Lanes,
     widths: &[Lanes],
@@ -18,56 +75,49 @@ pub(super) fn pass(
 ) -> Lanes {
     let mut w = NONE;
     match law {
-        Law::Power { .. } => add(&mut w, marks[0], z),
+        Law::Power { .. } => add(simd, &mut w, marks[0], &z),
         Law::Stops { weights, .. } => {
             let stops = weights.iter().zip(widths).zip(marks).zip(places);
             for (((weight, width), &mark), place) in stops {
                 // a play that slides up stands at z - r, one that slides down at z + r
                 if mark != 0.0 {
                     *place = z;
-                    add(place, -mark, *width);
+                    add(simd, place, -mark, width);
                 }
-                add(&mut w, *weight, z);
-                add(&mut w, -weight, *place);
+                add(simd, &mut w, *weight, &z);
+                add(simd, &mut w, -weight, place);
             }
         }
     }
     w
 }
 
+/// Adds a multiple.
 #[inline(always)]
-pub(super) fn add(sum: &mut Lanes, factor: f64, values: Lanes) {
-    for (sum, value) in sum.iter_mut().zip(values) {
-        *sum += factor * value;
+pub(super) fn add<S: Simd>(simd: S, sum: &mut Lanes, factor: f64, values: &Lanes) {
+    let factor = simd.splat_f64s(factor);
+    let (sums, values) = (S::as_mut_simd_f64s(sum).0, S::as_simd_f64s(values).0);
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum = simd.mul_add_e_f64s(factor, *value, *sum);
     }
-}
-
-/// Adds the sum of what both have, one by one weighted.
-#[inline(always)]
-pub(super) fn weigh(sum: &mut Lanes, weights: &[f64], values: &[Lanes]) {
-    let mut own = *sum;
-    for (&weight, value) in weights.iter().zip(values) {
-        add(&mut own, weight, *value);
-    }
-    *sum = own;
 }
 
 /// One sample of a section in observer form, driven.
 #[inline(always)]
-pub(super) fn relax(a: &[f64], x: &mut [Lanes], driven: &[Lanes]) {
+pub(super) fn relax<S: Simd>(simd: S, a: &[f64], x: &mut [Lanes], driven: &[Lanes]) {
     match (a, x) {
         ([a1, a2], [x1, x2]) => {
             let before = *x1;
             *x1 = driven[0];
-            add(x1, 1.0, *x2);
-            add(x1, -a1, before);
+            add(simd, x1, 1.0, x2);
+            add(simd, x1, -a1, &before);
             *x2 = driven[1];
-            add(x2, -a2, before);
+            add(simd, x2, -a2, &before);
         }
         (a, x) => {
             let before = x[0];
             x[0] = driven[0];
-            add(&mut x[0], -a[0], before);
+            add(simd, &mut x[0], -a[0], &before);
         }
     }
 }

@@ -73,15 +73,17 @@ pub(crate) fn fit(
     progress: Progress,
 ) -> Result<Fitted, Error> {
     const LARGEST_DAMPING: f64 = 1e6;
-    /// What a step gains over what it promised, where the curvature is right.
-    const RIGHT: f64 = 0.5;
-    let linearize = |point: &Point, step: usize, progress: Progress| {
-        let done = step as f64 / options.steps as f64;
+    /// Steps with a curvature of few experiments, most of which keep it, for one of the others.
+    const CHEAP: usize = 3;
+    /// Growth of the damping after which a curvature of earlier points is given up.
+    const PATIENCE: f64 = 8.0;
+    let linearize = |point: &Point, done: f64, progress: Progress| {
         let mut check = || report(progress, stage, done);
         Linearization::new(point, record, options.freedom, &options.weighting, &mut check)
     };
     let mut point = point;
-    let mut current = linearize(&point, 0, progress)?;
+    let mut current = linearize(&point, 0.0, progress)?;
+    let steps = options.steps * if current.is_of_few() { CHEAP } else { 1 };
     let mut history = vec![current.cost];
     // a curvature of few experiments promises too much in directions that these hardly move
     let mut damping: f64 = if current.is_of_few() { 1e-2 } else { 1e-4 };
@@ -92,11 +94,13 @@ pub(crate) fn fit(
     let squares =
         outputs.map(|(o, column)| options.weighting.outputs[o].powi(2) * column.norm_squared());
     let exact = 1e-25 * squares.sum::<f64>();
-    for step in 1..=options.steps {
+    for step in 1..=steps {
+        let done = step as f64 / steps as f64;
         let layout = &current.layout;
         let bounds = point.bounds(layout, record, options.freedom);
         let mut gram = current.equations.gram.clone();
-        for i in (0..layout.len).filter(|&i| !layout.is_linear(i)) {
+        let is_damped = |i: &usize| current.is_of_few() || !layout.is_linear(*i);
+        for i in (0..layout.len).filter(is_damped) {
             gram[(i, i)] *= 1.0 + damping;
         }
         let change = bounded(&gram, &current.descent(), &bounds.lower, &bounds.upper);
@@ -106,18 +110,19 @@ pub(crate) fn fit(
             status = Status::Converged;
             break;
         }
+        if current.is_of_few() && predicted > current.cost {
+            // no step takes more than there is: the curvature of few experiments lacks a direction
+            damping = (growth * damping).max(1e-9);
+            growth *= 2.0;
+            continue;
+        }
         let trial = point.moved(&change, layout);
         // a step that leads nowhere need not be linearized
-        report(progress, stage, step as f64 / options.steps as f64)?;
+        report(progress, stage, done)?;
         let cost = options.weighting.cost(&trial.residuals(record)?, record);
         if cost < current.cost {
-            let linearization = if current.cost - cost > RIGHT * predicted {
-                let mut check = || report(progress, stage, step as f64 / options.steps as f64);
-                let FitOptions { freedom, weighting, .. } = options;
-                current.near(&trial, record, *freedom, weighting, &mut check)?
-            } else {
-                linearize(&trial, step, progress)?
-            };
+            let mut check = || report(progress, stage, done);
+            let linearization = current.moved(&change, &trial, record, options, &mut check)?;
             let gained = current.cost - linearization.cost;
             let small =
                 gained < options.gain * current.cost && predicted < options.gain * current.cost;
@@ -131,8 +136,9 @@ pub(crate) fn fit(
                 status = Status::Converged;
                 break;
             }
-        } else if current.is_old() {
-            current = linearize(&point, step, progress)?;
+        } else if current.is_old() && growth > PATIENCE {
+            current = linearize(&point, done, progress)?;
+            growth = 2.0;
         } else if damping > LARGEST_DAMPING {
             status = Status::Stalled;
             break;

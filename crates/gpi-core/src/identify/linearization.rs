@@ -1,8 +1,9 @@
 //! The model linearized around a point, gathered into normal equations.
 
 use super::adjoint::descent;
+use super::levenberg_marquardt::FitOptions;
 use super::point::{Freedom, Layout, Point};
-use super::representatives::representatives;
+use super::representatives::{representatives, streamed};
 use super::stream::{Rows, Stream};
 use crate::linear::NormalEquations;
 use crate::{Error, Matrix, Record};
@@ -102,16 +103,10 @@ impl Linearization {
         let layout = Layout::new(point, freedom);
         let few = representatives(point, record, layout.len);
         let mut gathered = Gathered::new(layout.len);
-        let all = (0..record.experiments().len()).collect();
-        for &index in few.as_ref().map_or(&all, |few| &few.experiments) {
+        for (index, experiment, memory) in streamed(few.as_ref(), record) {
             check()?;
-            let experiment = &record.experiments()[index];
             let stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
-            let (memory, stride) =
-                few.as_ref().map_or((usize::MAX, 1), |few| (few.memory, few.stride));
-            gather(stream.with_memory(memory), check, |rows| {
-                gathered.add(rows.thinned(stride), weighting);
-            })?;
+            gather(stream.with_memory(memory), check, |rows| gathered.add(rows, weighting))?;
         }
         let Gathered { mut equations, mut cost } = gathered;
         let age = few.is_some().then_some(0);
@@ -124,23 +119,43 @@ impl Linearization {
         Ok(Self { equations, cost, layout, age })
     }
 
-    /// At a point near by: where the curvature is that of a few experiments, it is kept for a while.
-    pub(crate) fn near(
+    /// A step on: where the curvature is that of a few experiments, it is kept for a while, with what the
+    /// gradients at both ends of the step say of it.
+    pub(crate) fn moved(
         &self,
+        step: &DVector<f64>,
         point: &Point,
         record: &Record,
-        freedom: Freedom,
-        weighting: &Weighting,
+        options: &FitOptions,
         check: &mut dyn FnMut() -> Result<(), Error>,
     ) -> Result<Self, Error> {
-        const OLDEST: usize = 2;
+        const OLDEST: usize = 12;
+        let FitOptions { freedom, weighting, .. } = options;
         let Some(age) = self.age.filter(|&age| age < OLDEST) else {
-            return Self::new(point, record, freedom, weighting, check);
+            return Self::new(point, record, *freedom, weighting, check);
         };
-        let (descent, cost) = descent(point, &self.layout, freedom, weighting, record, check)?;
-        let mut near = Self { cost, age: Some(age + 1), ..self.clone() };
-        near.equations.rhs.set_column(0, &descent);
-        Ok(near)
+        let (descent, cost) = descent(point, &self.layout, *freedom, weighting, record, check)?;
+        let mut moved = Self { cost, age: Some(age + 1), ..self.clone() };
+        moved.learn(step, &(self.descent() - &descent));
+        moved.equations.rhs.set_column(0, &descent);
+        Ok(moved)
+    }
+
+    /// Makes the curvature along a step that of the change of the gradient (Broyden, Fletcher, Goldfarb and Shanno,
+    /// damped as Powell does where it would not stay positive).
+    fn learn(&mut self, step: &DVector<f64>, change: &DVector<f64>) {
+        const LEAST: f64 = 0.2;
+        let gram = &mut self.equations.gram;
+        let expected = &*gram * step;
+        let (found, power) = (step.dot(change), step.dot(&expected));
+        if power <= 0.0 {
+            return;
+        }
+        let trust =
+            if found >= LEAST * power { 1.0 } else { (1.0 - LEAST) * power / (power - found) };
+        let change = trust * change + (1.0 - trust) * &expected;
+        gram.ger(-1.0 / power, &expected, &expected, 1.0);
+        gram.ger(1.0 / step.dot(&change), &change, &change, 1.0);
     }
 
     /// Whether the curvature is that of a few experiments.

@@ -1,4 +1,4 @@
-//! A few experiments that stand for all where the derivatives of a whole record would take long.
+//! Parts of a few experiments that stand for all where the derivatives of a whole record would take long.
 
 use super::point::{Layout, Point};
 use crate::{Error, Experiment, Matrix, Record};
@@ -6,19 +6,19 @@ use crate::{Error, Experiment, Matrix, Record};
 /// Chosen experiments, and how much of the record they are.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Representatives {
-    /// In the record's order.
-    pub experiments: Vec<usize>,
-    /// Scored samples of the record over those of theirs that are used.
+    /// Their places in the record, and themselves with nothing but their part scored.
+    pub experiments: Vec<(usize, Experiment)>,
+    /// Scored samples of the record over theirs.
     pub ratio: f64,
-    /// Samples that a state of G remembers to one percent.
+    /// Samples before a part in which derivatives are taken along.
     pub memory: usize,
-    /// Every so many scored samples one is enough.
-    pub stride: usize,
 }
 
-/// Chooses experiments of evenly spread swings with enough samples for the curvature of the cost by so many
-/// unknowns, where all of them would take long; `None` where they would not, or where each experiment has
-/// unknowns of its own that the others say nothing about.
+/// Chooses experiments of evenly spread swings, and of each a part, with enough samples for the curvature of the
+/// cost by so many unknowns, where all of them would take long; `None` where they would not, or where each
+/// experiment has unknowns of its own that the others say nothing about.
+///
+/// Each has another part, lest all of them show the same end of a sweep.
 pub(crate) fn representatives(
     point: &Point,
     record: &Record,
@@ -30,18 +30,21 @@ pub(crate) fn representatives(
     const ENOUGH: f64 = 40.0;
     /// Small, middle and large swings.
     const FEWEST: f64 = 3.0;
+    /// Part of the record from which on choosing saves too little.
+    const MOST: f64 = 0.5;
     let experiments = record.experiments();
-    let values = (record.scored() * record.outputs().len()) as f64;
-    let unknowns = unknowns as f64;
-    let has_own = point.pasts.iter().any(|past| past.moving || past.plays.is_some());
-    if values * unknowns * unknowns < LONG || has_own {
-        return None;
-    }
     let all = experiments.len() as f64;
-    let count = (all * ENOUGH * unknowns / values).ceil().max(FEWEST);
-    if count > 0.5 * all {
+    let outputs = record.outputs().len() as f64;
+    let (values, enough) = (record.scored() as f64 * outputs, ENOUGH * unknowns as f64);
+    let has_own = point.pasts.iter().any(|past| past.moving || past.plays.is_some());
+    if values * (unknowns as f64).powi(2) < LONG
+        || enough > MOST * values
+        || all < FEWEST
+        || has_own
+    {
         return None;
     }
+    let count = (all * enough / values).ceil().max(FEWEST);
     let swing = |experiment: &Experiment| {
         let rows = experiment.scored_rows(&experiment.output).map(|rows| rows.norm_squared());
         rows.sum::<f64>() / experiment.scored() as f64
@@ -49,16 +52,31 @@ pub(crate) fn representatives(
     let swings: Vec<f64> = experiments.iter().map(swing).collect();
     let chosen = spread(&swings, count as usize);
     let own: usize = chosen.iter().map(|&index| experiments[index].scored()).sum();
-    let own = own as f64;
-    let stride = (own * record.outputs().len() as f64 / (ENOUGH * unknowns)).floor().max(1.0);
+    let parts = (own as f64 * outputs / enough).floor().max(1.0) as usize;
+    let part =
+        |(number, index): (usize, usize)| (index, experiments[index].part(number % parts, parts));
+    let chosen: Vec<(usize, Experiment)> = chosen.into_iter().enumerate().map(part).collect();
+    let own: usize = chosen.iter().map(|(_, own)| own.scored()).sum();
     let slowest = point.dynamics.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    // to one percent, and no longer than what is scored
     let memory = (0.01_f64.ln() / slowest.min(1.0 - 1e-9).ln()).ceil().max(0.0);
     Some(Representatives {
+        ratio: record.scored() as f64 / own as f64,
+        memory: (memory as usize).min(own / chosen.len()),
         experiments: chosen,
-        ratio: record.scored() as f64 * stride / own,
-        memory: memory as usize,
-        stride: stride as usize,
     })
+}
+
+/// The experiments whose derivatives are streamed, their places in the record, and how many samples before what
+/// is scored derivatives are taken along.
+pub(crate) fn streamed<'a>(
+    few: Option<&'a Representatives>,
+    record: &'a Record,
+) -> Vec<(usize, &'a Experiment, usize)> {
+    match few {
+        Some(few) => few.experiments.iter().map(|(i, part)| (*i, part, few.memory)).collect(),
+        None => record.experiments().iter().enumerate().map(|(i, e)| (i, e, usize::MAX)).collect(),
+    }
 }
 
 /// So many places among the ordered values, evenly spread.
@@ -72,24 +90,28 @@ fn spread(values: &[f64], count: usize) -> Vec<usize> {
 }
 
 impl Representatives {
-    /// Makes a Gram matrix of these experiments that of the record: all unknowns but the offsets, which every
+    /// Makes a Gram matrix of these parts that of the record: all unknowns but the offsets, which every
     /// experiment has for itself, have so much more to say.
     pub(crate) fn extend(&self, gram: &mut Matrix, layout: &Layout, record: &Record) {
+        let scored = |index: usize| record.experiments()[index].scored() as f64;
+        let mut factors = vec![self.ratio; layout.len];
         let mut is_own = vec![false; layout.len];
         layout.offsets.iter().for_each(|own| is_own[own.clone()].fill(true));
+        for (index, part) in &self.experiments {
+            let whole = scored(*index) / part.scored() as f64;
+            factors[layout.offsets[*index].clone()].fill(whole);
+        }
         for (j, mut column) in gram.column_iter_mut().enumerate() {
             for (i, value) in column.iter_mut().enumerate() {
-                let is_shared = !is_own[i] && !is_own[j];
-                *value *= if is_shared { self.ratio } else { self.stride as f64 };
+                *value *= if is_own[j] { factors[j] } else { factors[i] };
             }
         }
         // offsets elsewhere are as well determined as here
-        let like = self.experiments[0];
+        let like = self.experiments[0].0;
         let known = layout.offsets[like].clone();
         let known = gram.view((known.start, known.start), (known.len(), known.len())).into_owned();
-        let scored = |index: usize| record.experiments()[index].scored() as f64;
-        let others = (0..record.experiments().len()).filter(|i| !self.experiments.contains(i));
-        for index in others {
+        let is_chosen = |index: &usize| self.experiments.iter().any(|(own, _)| own == index);
+        for index in (0..record.experiments().len()).filter(|index| !is_chosen(index)) {
             let own = layout.offsets[index].clone();
             let mut block = gram.view_mut((own.start, own.start), (own.len(), own.len()));
             block.copy_from(&(&known * (scored(index) / scored(like))));
@@ -98,12 +120,12 @@ impl Representatives {
 
     /// A point and a record with these experiments alone.
     pub(crate) fn alone(&self, point: &Point, record: &Record) -> Result<(Point, Record), Error> {
-        let of = |index: &usize| record.experiments()[*index].clone();
-        let record = record.with_experiments(self.experiments.iter().map(of).collect())?;
+        let parts = self.experiments.iter().map(|(_, part)| part.clone());
+        let record = record.with_experiments(parts.collect())?;
         let mut point = point.clone();
-        point.pasts = self.experiments.iter().map(|&index| point.pasts[index].clone()).collect();
-        point.offsets =
-            self.experiments.iter().map(|&index| point.offsets[index].clone()).collect();
+        let places = || self.experiments.iter().map(|(index, _)| *index);
+        point.pasts = places().map(|index| point.pasts[index].clone()).collect();
+        point.offsets = places().map(|index| point.offsets[index].clone()).collect();
         Ok((point, record))
     }
 }
@@ -137,7 +159,8 @@ mod tests {
         let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
         let prepared = Prepared::new(&record, channels).unwrap();
         let point = prepared.point_of(&model).unwrap();
-        let few = Representatives { experiments: vec![1, 3], ratio: 2.5, memory: 0, stride: 1 };
+        let whole = |index: usize| (index, prepared.record.experiments()[index].clone());
+        let few = Representatives { experiments: vec![whole(1), whole(3)], ratio: 2.5, memory: 0 };
         let (expected, layout) = gram(&point, &prepared.record);
         let (alone, own) = few.alone(&point, &prepared.record).unwrap();
         let (two, within) = gram(&alone, &own);
@@ -146,7 +169,7 @@ mod tests {
         let mut found = Matrix::zeros(layout.len, layout.len);
         let place = |i: usize| match i.checked_sub(shared) {
             None => i,
-            Some(k) => layout.offsets[few.experiments[k / 2]].start + k % 2,
+            Some(k) => layout.offsets[few.experiments[k / 2].0].start + k % 2,
         };
         for i in 0..within.len {
             for j in 0..within.len {
@@ -173,6 +196,18 @@ mod tests {
         let prepared = Prepared::new(&record, channels).unwrap();
         let point = prepared.point_of(&model).unwrap();
         assert_eq!(representatives(&point, &prepared.record, 50), None);
+    }
+
+    #[test]
+    fn parts_score_every_sample_once() {
+        let model = model();
+        let mut whole = record(&model, vec![run(1.5, 0.0, 100, vec![])]).experiments()[0].clone();
+        whole.held_out = vec![150..170, 300..310];
+        let parts: Vec<Experiment> = (0..3).map(|number| whole.part(number, 3)).collect();
+        let scored = parts.iter().flat_map(Experiment::scored_runs).flatten();
+        assert!(scored.eq(whole.scored_runs().flatten()));
+        let third = whole.scored() / 3;
+        assert!(parts.iter().all(|part| part.scored().abs_diff(third) <= 1));
     }
 
     #[test]

@@ -21,21 +21,6 @@ pub(crate) struct Rows {
     pub residuals: Matrix,
 }
 
-impl Rows {
-    /// One of every so many.
-    pub(crate) fn thinned(self, stride: usize) -> Self {
-        if stride == 1 {
-            return self;
-        }
-        let places: Vec<usize> = (0..self.residuals.ncols()).step_by(stride).collect();
-        let thin = |matrix: &Matrix| matrix.select_columns(&places);
-        Self {
-            regressors: self.regressors.iter().map(thin).collect(),
-            residuals: thin(&self.residuals),
-        }
-    }
-}
-
 /// Streams one experiment and hands its rows on block by block.
 pub(crate) struct Stream<'a> {
     point: &'a Point,
@@ -105,7 +90,8 @@ impl<'a> Stream<'a> {
     /// Takes derivatives along from so many samples before the first scored one only: what they were before
     /// has decayed.
     pub(crate) fn with_memory(mut self, samples: usize) -> Self {
-        self.tangents_from = self.experiment.warmup.saturating_sub(samples);
+        let first = self.experiment.scored_runs().next().map_or(0, |run| run.start);
+        self.tangents_from = first.saturating_sub(samples);
         self
     }
 
@@ -116,7 +102,8 @@ impl<'a> Stream<'a> {
     ) -> Result<(), Error> {
         let outputs = self.point.dynamics.outputs();
         let is_scored = self.scored();
-        for first in self.blocks() {
+        let last = is_scored.iter().rposition(|&scored| scored).map_or(0, |last| last + 1);
+        for first in self.blocks().take_while(|&first| first < last) {
             let (trace, residuals) = self.pass(first, &is_scored);
             if trace.samples.end <= self.tangents_from {
                 continue;

@@ -1,11 +1,12 @@
 //! Derivatives by all unknowns, taken through G, its loops and the output stage side by side.
 
 use super::injections::{Injection, Places, Signals, injections};
-use super::lanes::{LANES, Lanes, NONE, add, pass, relax, weigh};
+use super::lanes::{LANES, Lanes, NONE, Weights, add, pass, relax};
 use super::point::{Layout, Point};
 use crate::effects::{InnerLoop, Sees, Slope, Stage};
 use crate::linear::Section;
 use crate::{Experiment, Matrix};
+use pulp::Simd;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -29,9 +30,11 @@ pub(crate) struct Trace {
 /// Everything linear that a change runs through.
 pub(crate) struct Tangents<'a> {
     sections: &'a [Section],
-    /// Rows of C by outputs, columns of B by inputs.
-    c: Vec<Vec<f64>>,
-    b: Vec<Vec<f64>>,
+    /// Rows of C, then of S of all loops.
+    seen: Weights,
+    /// Columns of B and of E.
+    driven: Weights,
+    circulating: Weights,
     d: &'a Matrix,
     loops: Vec<&'a InnerLoop>,
     /// The output that each effect of the output stage acts on.
@@ -111,10 +114,20 @@ impl<'a> Tangents<'a> {
         };
         let tiles: Vec<Tile> = (0..layout.len).step_by(LANES).map(tile).collect();
         let (c, b) = by_states(&dynamics.sections, dynamics.outputs(), dynamics.inputs());
+        let none = vec![0.0; dynamics.order()];
+        let sees = |inner: &&'a InnerLoop| match &inner.sees {
+            Sees::Output(_) => &none[..],
+            Sees::Mixture { states, .. } => states,
+        };
+        let rows =
+            |rows: &[Vec<f64>]| Weights::new(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let seen = c.iter().map(Vec::as_slice).chain(loops.iter().map(sees));
+        let drives: Vec<&[f64]> = loops.iter().map(|inner| &inner.drives[..]).collect();
         Self {
             sections: &dynamics.sections,
-            c,
-            b,
+            seen: Weights::new(&seen.collect::<Vec<_>>()),
+            driven: rows(&b),
+            circulating: Weights::new(&drives),
             d: &dynamics.d,
             loops,
             tiles: tiles.into_iter().filter(Tile::is_active).collect(),
@@ -136,7 +149,9 @@ impl<'a> Tangents<'a> {
         const PARALLEL: usize = 200_000;
         let mut tiles = std::mem::take(&mut self.tiles);
         let this = &*self;
-        let advance = |tile: &mut Tile| pulp::Arch::new().dispatch(|| this.advance(tile, trace));
+        let advance = |tile: &mut Tile| {
+            pulp::Arch::new().dispatch(Advance { tangents: this, tile, trace });
+        };
         if tiles.len() * trace.samples.len() * self.places.len > PARALLEL {
             tiles.par_iter_mut().for_each(advance);
         } else {
@@ -156,8 +171,9 @@ impl<'a> Tangents<'a> {
 
     /// One tile through a block.
     #[inline(always)]
-    fn advance(&self, tile: &mut Tile, trace: &Trace) {
+    fn advance<S: Simd>(&self, simd: S, tile: &mut Tile, trace: &Trace) {
         let Places { v, y, z, w, states, half_widths, .. } = &self.places;
+        let seen = y.start..z.end;
         let mut scored = trace.scored.iter().peekable();
         tile.rows.iter_mut().for_each(Vec::clear);
         let marks = trace.marks.len() / trace.samples.len();
@@ -177,32 +193,32 @@ impl<'a> Tangents<'a> {
             }
             let work = &mut tile.work[..];
             let x = &tile.x[tile.states.clone()];
-            for (output, c) in self.c.iter().enumerate() {
-                let mut sum = work[y.start + output];
-                weigh(&mut sum, &c[tile.states.clone()], x);
-                if tile.drives {
+            self.seen.gather(simd, &mut work[seen.clone()], tile.states.start, x);
+            if tile.drives {
+                for output in 0..y.len() {
                     for input in v.clone() {
-                        add(&mut sum, self.d[(output, input - v.start)], work[input]);
+                        let (factor, change) = (self.d[(output, input - v.start)], work[input]);
+                        add(simd, &mut work[y.start + output], factor, &change);
                     }
                 }
-                work[y.start + output] = sum;
             }
             let mut marks = &trace.marks[k * marks..(k + 1) * marks];
             let mut plays = &mut tile.plays[..];
             for (number, inner) in self.loops.iter().enumerate() {
                 let mut sum = work[z.start + number];
                 match &inner.sees {
-                    Sees::Output(output) => add(&mut sum, 1.0, work[y.start + output]),
-                    Sees::Mixture { states, inputs } => {
-                        weigh(&mut sum, states, x);
-                        weigh(&mut sum, inputs, &work[v.clone()]);
+                    Sees::Output(output) => add(simd, &mut sum, 1.0, &work[y.start + output]),
+                    Sees::Mixture { inputs, .. } => {
+                        for (factor, change) in inputs.iter().zip(&work[v.clone()]) {
+                            add(simd, &mut sum, *factor, change);
+                        }
                     }
                 }
                 let (own, others) = marks.split_at(inner.law.marks());
                 let (places, rest) = plays.split_at_mut(inner.law.stops());
                 let widths = &work[half_widths[number].clone()];
-                let around = pass(&inner.law, sum, widths, own, places);
-                add(&mut work[w.start + number], 1.0, around);
+                let around = pass(simd, &inner.law, sum, widths, own, places);
+                add(simd, &mut work[w.start + number], 1.0, &around);
                 (marks, plays) = (others, rest);
             }
             let scores = scored.next_if(|&&scored| scored == k).is_some();
@@ -221,23 +237,17 @@ impl<'a> Tangents<'a> {
                 let rows = tile.rows.iter_mut().zip(&work[y.clone()]);
                 rows.for_each(|(rows, row)| rows.push(*row));
             }
+            let (before, rest) = work.split_at_mut(states.start);
+            let next = &mut rest[..states.len()];
             if tile.drives {
-                for (input, b) in v.clone().zip(&self.b) {
-                    let change = work[input];
-                    let driven = work[states.clone()].iter_mut().zip(b);
-                    driven.for_each(|(next, b)| add(next, *b, change));
-                }
+                self.driven.scatter(simd, next, &before[v.clone()]);
             }
-            for (number, inner) in self.loops.iter().enumerate() {
-                let change = work[w.start + number];
-                let driven = work[states.clone()].iter_mut().zip(&inner.drives);
-                driven.for_each(|(next, drive)| add(next, *drive, change));
-            }
+            self.circulating.scatter(simd, next, &before[w.clone()]);
             let mut first = tile.states.start;
             for section in &self.sections[tile.sections.clone()] {
                 let order = section.order();
                 let next = &work[states.start + first..states.start + first + order];
-                relax(&section.a, &mut tile.x[first..first + order], next);
+                relax(simd, &section.a, &mut tile.x[first..first + order], next);
                 first += order;
             }
         }
@@ -254,9 +264,10 @@ impl<'a> Tangents<'a> {
         for section in self.sections {
             let order = section.order();
             let drive = Matrix::from_fn(order, LANES, |j, lane| {
-                let driven = v.clone().zip(&self.b);
-                tile.work[states.start + first + j][lane]
-                    + driven.map(|(input, b)| b[first + j] * tile.work[input][lane]).sum::<f64>()
+                let driven = v.clone().enumerate();
+                let driven =
+                    driven.map(|(column, place)| section.b[(j, column)] * tile.work[place][lane]);
+                tile.work[states.start + first + j][lane] + driven.sum::<f64>()
             });
             let standing = section.standing(&drive);
             for j in 0..order {
@@ -264,6 +275,23 @@ impl<'a> Tangents<'a> {
             }
             first += order;
         }
+    }
+}
+
+/// A tile and a block, for the widest vectors that the processor has.
+struct Advance<'a, 'b> {
+    tangents: &'a Tangents<'b>,
+    tile: &'a mut Tile,
+    trace: &'a Trace,
+}
+
+impl pulp::WithSimd for Advance<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { tangents, tile, trace } = self;
+        tangents.advance(simd, tile, trace);
     }
 }
 

@@ -5,7 +5,7 @@ use super::colour::Colour;
 use super::levenberg_marquardt::{FitOptions, Fitted};
 use super::linearization::{Weighting, gather};
 use super::point::{Bounds, Freedom, Layout, Point};
-use super::representatives::representatives;
+use super::representatives::{representatives, streamed};
 use super::stream::Stream;
 use crate::linear::{NormalEquations, symmetric_eigen};
 use crate::{Error, Matrix, Record};
@@ -175,11 +175,8 @@ fn score_gram(
     let root = vectors * Matrix::from_diagonal(&values.map(|value| value.max(0.0).sqrt()));
     let mut equations = NormalEquations::zeros(layout.len, 1);
     let few = representatives(point, record, layout.len);
-    let all = (0..record.experiments().len()).collect();
-    for &index in few.as_ref().map_or(&all, |few| &few.experiments) {
-        let experiment = &record.experiments()[index];
+    for (index, experiment, memory) in streamed(few.as_ref(), record) {
         let stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
-        let (memory, stride) = few.as_ref().map_or((usize::MAX, 1), |few| (few.memory, few.stride));
         let mut past: Vec<Matrix> =
             colour.coefficients.iter().map(|a| Matrix::zeros(layout.len, a.len())).collect();
         gather(stream.with_memory(memory), check, |rows| {
@@ -201,14 +198,13 @@ fn score_gram(
                 past.copy_from(&extended.columns(count, order));
                 filtered.push(extended.columns(order, count).into_owned());
             }
-            let places: Vec<usize> = (0..rows.residuals.ncols()).step_by(stride).collect();
-            let none = Matrix::zeros(1, places.len());
+            let none = Matrix::zeros(1, rows.residuals.ncols());
             for mixed in 0..outputs {
                 let mut sum = &filtered[0] * root[(0, mixed)];
                 for (output, part) in filtered.iter().enumerate().skip(1) {
                     sum += part * root[(output, mixed)];
                 }
-                equations.add(&sum.select_columns(&places), &none);
+                equations.add(&sum, &none);
             }
         })?;
     }
