@@ -7,6 +7,9 @@ import numpy as np
 
 from gpi_hammerstein._native import Explanation, effect_names
 
+# Parameters of an effect that a sentence can hold.
+SHOWN = 6
+
 __all__ = ["failed_in_words", "in_words", "to_dict"]
 
 
@@ -112,8 +115,10 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
         name = step["effect"]
         if name is None or not step["parameters"]:
             continue
-        numbers = ", ".join(number(label, row) for label, row in list(step["parameters"].items())[:6])
-        yield f"{name} ({'one more' if name in shown else names[name]}): {numbers}."
+        numbers = [number(label, row) for label, row in step["parameters"].items()]
+        if len(numbers) > SHOWN:
+            numbers[SHOWN:] = [f"{len(numbers) - SHOWN} more"]
+        yield f"{name} ({'one more' if name in shown else names[name]}): {', '.join(numbers)}."
         shown.add(name)
     if result["moved_resonance"]:
         small, large = result["moved_resonance"]

@@ -268,6 +268,14 @@ def test_a_resonance_that_moves_with_the_swing_rules_the_input_out(explained: gp
     assert "cannot move a resonance" in words
 
 
+def test_a_sentence_says_how_many_parameters_it_leaves_out(explained: gpi.Explanation) -> None:
+    result = to_dict(explained)
+    (added,) = (step for step in result["steps"] if step["effect"] == "stiffness")
+    (sentence,) = (words for words in in_words(result) if words.startswith("stiffness ("))
+    assert sentence.count("±") <= 6
+    assert sentence.endswith(f", {len(added['parameters']) - 6} more.")
+
+
 def test_a_resonance_stays_where_it_is_without_loops() -> None:
     model = model_of(plant())
     inputs = [swing * multisine(1500, seed) for seed, swing in enumerate((0.3, 1.0, 3.0))]
