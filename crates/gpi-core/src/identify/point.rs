@@ -173,8 +173,6 @@ impl Point {
     pub(crate) fn bounds(&self, layout: &Layout, record: &Record, freedom: Freedom) -> Bounds {
         /// Fraction of a gap to a neighbour, or of a range, that one step may take.
         const REACH: f64 = 0.4;
-        /// Time constants of a resonance that a record holds at least: what outlives it is a disturbance.
-        const LIFETIMES: f64 = 3.0;
         let mut lower = DVector::from_element(layout.len, f64::NEG_INFINITY);
         let mut upper = DVector::from_element(layout.len, f64::INFINITY);
         let mut bound = |unknown: usize, low: f64, high: f64| {
@@ -235,13 +233,8 @@ impl Point {
                 }
             }
         }
-        let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(1);
-        let undamped = (-2.0 * LIFETIMES / longest as f64).exp();
         for (section, unknowns) in self.dynamics.sections.iter().zip(&layout.sections) {
             let outputs = self.dynamics.outputs();
-            if let ([_, a2], true) = (&section.a[..], !unknowns.a.is_empty()) {
-                bound(unknowns.a.start + 1, f64::NEG_INFINITY, undamped - a2);
-            }
             if let Some(effect) = section.beside {
                 let (low, high) = self.effects[effect].block().section_bounds(self.rate);
                 if let ([a1], true) = (&section.a[..], !unknowns.a.is_empty()) {
