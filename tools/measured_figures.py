@@ -76,7 +76,7 @@ def steering_mirror() -> None:
             line += f"; ERA order {system.order}{chosen} {score(system, inputs[5], outputs[5]):.2f}"
             line += f", largest pole {system.spectral_radius:.4f}"
         print(line)
-        train = gpi.Record(inputs[:5], outputs[:5], rate=12500.0, warmup=8192)
+        train = gpi.Record(inputs[:5], outputs[:5], rate=6400.0, warmup=8192)
         for order in (28, None):
             start = time.perf_counter()
             model = gpi.identify(train, half_widths=[0.0], thresholds=0, order=order)

@@ -203,7 +203,7 @@ def parameters(model: Model) -> int:
     int
         Of G ``n (inputs + outputs) + inputs outputs``, n its order: A has as many free numbers as the choice
         of coordinates takes. Of each loop its drives, what it sees, its half-widths and weights, without
-        the two that set its scales.
+        those that set its scales.
 
     Examples
     --------
@@ -218,7 +218,7 @@ def parameters(model: Model) -> int:
             mixture = around["sees"].get("mixture", {})
             count += len(mixture.get("states", [])) + len(mixture.get("inputs", []))
             stops = around["law"].get("stops")
-            count += 2 * len(stops["half_widths"]) - 2 if stops else 0
+            count += 2 * len(stops["half_widths"]) - 2 if stops else -1 if mixture else 0
     return count
 
 

@@ -1,5 +1,6 @@
 //! A loop that is closed around the linear dynamics.
 
+use crate::linear::dot;
 use crate::operators::play;
 
 /// `w = law(z)`, and `w(k)` drives the states of G for sample k + 1: `x+ = A x + B v + E w`.
@@ -101,10 +102,6 @@ impl Sees {
             }
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl InnerLoop {

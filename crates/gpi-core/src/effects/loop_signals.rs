@@ -26,11 +26,31 @@ impl LoopSignal {
     }
 }
 
-/// The families of signals to be tried, one after the other.
-pub(super) fn families(situation: &Situation) -> [Vec<LoopSignal>; 4] {
+/// What loops make of their signals.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Shape {
+    /// Hysteresis.
+    Stops,
+    /// A force that differs between the directions.
+    Square,
+}
+
+/// The families of loops that are left to be tried: the next signals for hysteresis, and squares.
+pub(super) fn families(situation: &Situation) -> Vec<(Shape, Vec<LoopSignal>)> {
     let displaced = displaced(situation);
     let (apart, together) = (pairs(&displaced, -1.0), pairs(&displaced, 1.0));
-    [displaced, driven(situation), apart, together]
+    let count = |has_stops: bool| {
+        situation.loops.iter().filter(|inner| (inner.law.stops() > 0) == has_stops).count()
+    };
+    // one after the other, as long as each has something to explain
+    let mut known = 0;
+    let next =
+        [displaced.clone(), driven(situation), apart, together].into_iter().find(|signals| {
+            known += signals.len();
+            count(true) < known
+        });
+    let squares = (count(false) == 0).then_some((Shape::Square, displaced));
+    next.map(|signals| (Shape::Stops, signals)).into_iter().chain(squares).collect()
 }
 
 /// The v that would hold each displacement still: `G(1)^-1 (C x + D v)`.
@@ -87,4 +107,47 @@ fn stacked(signals: &[Matrix]) -> Matrix {
         first += signal.nrows();
     }
     stacked
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Model;
+    use crate::explain::score::Base;
+    use crate::identify::linearization::Weighting;
+    use crate::identify::looped::{model, record, run};
+    use crate::identify::point::{DynamicsFreedom, Freedom};
+    use crate::identify::preparation::Prepared;
+    use crate::identify::sensitivity::{Derivatives, Parameters};
+
+    fn next(model: &Model) -> Vec<(bool, Vec<f64>)> {
+        let record = record(model, vec![run(1.5, 0.0, 100, vec![])]);
+        let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
+        let prepared = Prepared::new(&record, channels).unwrap();
+        let point = prepared.point_of(model).unwrap();
+        let freedom = Freedom {
+            weights: true,
+            derivatives: Derivatives { thresholds: false, half_widths: false, starts: false },
+            identity: true,
+            dynamics: DynamicsFreedom::Everything,
+        };
+        let weighting = Weighting::equal(2);
+        let base = Base::new(&point, &prepared.record, freedom, &weighting).unwrap();
+        base.situation(|situation| {
+            let inputs = |signal: &LoopSignal| signal.inputs.row(0).iter().copied().collect();
+            let found = families(situation).into_iter();
+            found.map(|(shape, signals)| (shape == Shape::Stops, inputs(&signals[1]))).collect()
+        })
+    }
+
+    #[test]
+    fn displacements_come_first_and_squares_once() {
+        let model = model();
+        let plain = model.clone().with_effects(vec![]).unwrap();
+        let found = next(&plain);
+        assert_eq!(found.iter().map(|family| family.0).collect::<Vec<_>>(), [true, false]);
+        assert_eq!(found[0].1, found[1].1, "both of the displacements");
+        // beside two loops of stops and one of a power: the second v itself
+        assert_eq!(next(&model), [(true, vec![0.0, 1.0])]);
+    }
 }

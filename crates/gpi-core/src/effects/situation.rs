@@ -1,6 +1,6 @@
 //! What the candidates of the catalogue are placed by.
 
-use super::Effect;
+use super::{Effect, InnerLoop};
 use crate::linear::Sections;
 use crate::{Matrix, Record};
 
@@ -18,7 +18,7 @@ pub(crate) struct Situation<'a> {
     /// G alone.
     pub dynamics: &'a Sections,
     /// Loops that are closed around it.
-    pub loops: usize,
+    pub loops: Vec<&'a InnerLoop>,
     /// Half-width of the widest play of each input.
     pub widest: Vec<f64>,
     /// The range of the plays' input, one an input.

@@ -1,13 +1,14 @@
 //! A resonance that moves with amplitude.
 
-use super::loop_signals::{LoopSignal, families};
+use super::loop_signals::{LoopSignal, Shape, families};
 use super::{Block, Candidate, InnerLoop, Law, Quantity, Sees, Situation, Stage, Units};
 
 /// Loops around G: a restoring force that is not in proportion to the displacement acts inside the
 /// mechanics, `x+ = A x + B v + E w`, `w = law(S x + T v)`.
 ///
 /// Powers of the displacement make Duffing's oscillator (a cube) or directions that differ (a square); stops
-/// make hysteresis inside the loop, which softens the mechanics and damps them as the amplitude grows.
+/// make hysteresis inside the loop, which softens the mechanics and damps them as the amplitude grows. Around
+/// several outputs z mixes the states: of the displacements first, then of what drives them.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Stiffness {
     /// At least one.
@@ -28,15 +29,10 @@ impl Stiffness {
             return Vec::new();
         }
         if situation.outputs().len() == 1 {
-            return if situation.loops == 0 { powers(situation) } else { Vec::new() };
+            return if situation.loops.is_empty() { powers(situation) } else { Vec::new() };
         }
-        // one after the other, as long as each has something to explain
-        let mut loops = 0;
-        let next = families(situation).into_iter().find(|family| {
-            loops += family.len();
-            situation.loops < loops
-        });
-        next.map_or_else(Vec::new, |signals| stops(&signals, situation))
+        let families = families(situation).into_iter();
+        families.flat_map(|(shape, signals)| around(shape, &signals, situation)).collect()
     }
 }
 
@@ -57,18 +53,22 @@ fn powers(situation: &Situation) -> Vec<Candidate> {
     [order..2 * order, 0..2 * order].map(|places| Candidate::linear(block.clone(), places)).to_vec()
 }
 
-/// Stops of these signals.
-fn stops(signals: &[LoopSignal], situation: &Situation) -> Vec<Candidate> {
+/// Loops through these signals.
+fn around(shape: Shape, signals: &[LoopSignal], situation: &Situation) -> Option<Candidate> {
     /// Half-widths over the root mean square.
     const HALF_WIDTHS: [f64; 3] = [0.15, 0.5, 1.5];
     let order = situation.dynamics.order();
     let moving = signals.iter().filter(|signal| signal.rms() > 0.0);
-    let inner = moving.map(|signal| InnerLoop {
-        sees: signal.sees(),
-        law: Law::Stops {
-            half_widths: HALF_WIDTHS.map(|r| r * signal.rms()).to_vec(),
+    let law = |rms: f64| match shape {
+        Shape::Stops => Law::Stops {
+            half_widths: HALF_WIDTHS.map(|r| r * rms).to_vec(),
             weights: vec![1.0; HALF_WIDTHS.len()],
         },
+        Shape::Square => Law::Power { exponent: 2, scale: rms },
+    };
+    let inner = moving.map(|signal| InnerLoop {
+        sees: signal.sees(),
+        law: law(signal.rms()),
         drives: vec![0.0; order],
     });
     let block = Stiffness { loops: inner.collect() };
@@ -78,7 +78,7 @@ fn stops(signals: &[LoopSignal], situation: &Situation) -> Vec<Candidate> {
         places.extend(first..first + order);
         first += values_of(inner);
     }
-    if places.is_empty() { Vec::new() } else { vec![Candidate::linear(block, places)] }
+    (!places.is_empty()).then(|| Candidate::linear(block, places))
 }
 
 /// How many values a loop has.
@@ -157,11 +157,18 @@ impl Block for Stiffness {
         let free = |count: usize| vec![(f64::NEG_INFINITY, f64::INFINITY); count];
         let mut bounds = Vec::new();
         for inner in &self.loops {
-            let seen = match &inner.sees {
-                Sees::Output(_) => 0,
-                Sees::Mixture { states, inputs } => states.len() + inputs.len(),
-            };
-            bounds.extend(free(inner.drives.len() + seen));
+            bounds.extend(free(inner.drives.len()));
+            if let Sees::Mixture { states, inputs } = &inner.sees {
+                let seen = || states.iter().chain(inputs);
+                bounds.extend(free(states.len() + inputs.len()));
+                let largest =
+                    seen().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+                // of a power, whose scale is in its drives as well
+                if let (Some((place, value)), Law::Power { .. }) = (largest, &inner.law) {
+                    let first = bounds.len() - seen().count();
+                    bounds[first + place] = (value, value);
+                }
+            }
             if let Law::Stops { half_widths, weights } = &inner.law {
                 /// Of the logarithms: beyond a thousandth of the widest stop, or a thousand times it, the
                 /// others are stops no longer.

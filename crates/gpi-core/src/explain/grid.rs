@@ -1,6 +1,7 @@
 //! Half-widths and thresholds that the residual asks for.
 
-use super::score::{Base, LEFT, Projection};
+use super::projection::{LEFT, Projection};
+use super::score::Base;
 use crate::effects::Stage;
 use crate::identify::free_run::Signals;
 use crate::identify::point::{Point, range};

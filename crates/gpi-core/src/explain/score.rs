@@ -1,10 +1,10 @@
 //! The score (Lagrange multiplier) test: what a candidate would explain, without fitting it.
 
-use crate::effects::{Candidate, Effect, Situation, Stage};
+use super::projection::{LEFT, Projection};
+use crate::effects::{Candidate, Effect, Situation};
 use crate::identify::free_run::Signals;
-use crate::identify::linearization::{Linearization, Weighting, gather};
+use crate::identify::linearization::{Linearization, Weighting};
 use crate::identify::point::{Freedom, Point};
-use crate::identify::stream::{Rows, Stream};
 use crate::identify::uncertainty::descending_eigen;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::DVector;
@@ -58,8 +58,8 @@ pub(crate) struct Base<'a> {
     pub residuals: Vec<Matrix>,
     /// Scaled eigenvectors of the Gram matrix of what is free, over the roots of their eigenvalues:
     /// `W W^T` is its inverse.
-    whitening: Matrix,
-    linearization: Linearization,
+    pub(super) whitening: Matrix,
+    pub(super) linearization: Linearization,
 }
 
 impl<'a> Base<'a> {
@@ -128,42 +128,34 @@ impl<'a> Base<'a> {
             displacements: &select(|signals| &signals.displacement),
             residuals: &self.residuals,
             dynamics: &self.point.dynamics.own(),
-            loops: self.point.loops().count(),
+            loops: self.point.loops().collect(),
             widest: widest.collect(),
         })
     }
 
     /// Scores of a few candidates.
     fn score(&self, candidates: &[Candidate]) -> Result<Vec<Score>, Error> {
+        /// Probes whose derivatives are faster all at once than one after the other.
+        const MANY: usize = 50;
+        if let [candidate] = candidates
+            && candidate.probes.len() > MANY
+            && let Some(projection) = self.loops_projected(candidate)?
+        {
+            return Ok(vec![scored(candidate, 0, &projection)]);
+        }
         let probes = candidates.iter().map(|candidate| candidate.probes.len()).sum();
         let columns = |known: &Signals, here: &Matrix, experiment: &Experiment, index: usize| {
             let of = |candidate| self.columns(candidate, known, here, experiment, index);
             let columns: Result<Vec<_>, Error> = candidates.par_iter().map(of).collect();
             Ok(columns?.into_iter().flatten().collect())
         };
-        let Projection { left, score, squares, cost } = self.project(probes, &columns)?;
-        let mut found = Vec::new();
+        let projection = self.project(probes, &columns)?;
         let mut first = 0;
-        for candidate in candidates {
-            let places: Vec<usize> = (first..first + candidate.probes.len())
-                .filter(|&i| left[(i, i)] > LEFT * squares[i])
-                .collect();
-            let own =
-                Matrix::from_fn(places.len(), places.len(), |i, j| left[(places[i], places[j])]);
-            let rhs = DVector::from_fn(places.len(), |i, _| score[places[i]]);
-            let solution = solve_scaled(own, &rhs);
-            let gain = solution.dot(&rhs) / cost.max(f64::MIN_POSITIVE);
-            let mut coefficients = vec![0.0; candidate.probes.len()];
-            for (value, &place) in solution.iter().zip(&places) {
-                coefficients[place - first] = *value;
-            }
-            let columns = places.len();
-            let start = candidate.start(&coefficients);
-            let zero = candidate.linear.then(|| candidate.block.clone());
-            found.push(Score { start, zero, gain: gain.clamp(0.0, 1.0), columns });
+        let place = |candidate: &Candidate| {
             first += candidate.probes.len();
-        }
-        Ok(found)
+            scored(candidate, first - candidate.probes.len(), &projection)
+        };
+        Ok(candidates.iter().map(place).collect())
     }
 
     /// What the output gains by each probe of a candidate; `here` is the output.
@@ -187,70 +179,28 @@ impl<'a> Base<'a> {
         let gained = |probe: &Effect| self.point.gained_by(probe, known, here, experiment, index);
         candidate.probes.par_iter().map(gained).collect()
     }
-
-    /// So many columns beside the model's own, projected off its sensitivities. `columns` makes them for an
-    /// experiment from the signals and the output, and its place.
-    pub(crate) fn project(&self, n: usize, columns: Columns) -> Result<Projection, Error> {
-        let unknowns = self.linearization.layout.len;
-        let mut cross = Matrix::zeros(unknowns, n);
-        let mut squares = Matrix::zeros(n, n);
-        let mut with_residual = DVector::zeros(n);
-        for (index, experiment) in self.record.experiments().iter().enumerate() {
-            let known = &self.signals[index];
-            let here = self.point.output_from(Stage::Added, known, experiment, index)?;
-            let columns = columns(known, &here, experiment, index)?;
-            let places: Vec<usize> = experiment.scored_runs().flatten().collect();
-            let mut first = 0;
-            let derivatives = self.freedom.derivatives;
-            let layout = &self.linearization.layout;
-            let stream = Stream::new(self.point, layout, derivatives, experiment, index)?;
-            gather(stream, &mut || Ok(()), |Rows { regressors, residuals }| {
-                let count = residuals.ncols();
-                let places = &places[first..first + count];
-                for (output, regressor) in regressors.iter().enumerate() {
-                    let own = Matrix::from_fn(count, n, |row, column| {
-                        columns[column][(places[row], output)]
-                    });
-                    let residual = residuals.row(output).transpose();
-                    let weights = residual.map(|value| self.weighting.of(output, value).0);
-                    let mut weighted = own.clone();
-                    for mut column in weighted.column_iter_mut() {
-                        column.component_mul_assign(&weights);
-                    }
-                    cross.gemm(1.0, regressor, &weighted, 1.0);
-                    squares.gemm_tr(1.0, &own, &weighted, 1.0);
-                    with_residual.gemv_tr(1.0, &weighted, &residual, 1.0);
-                }
-                first += count;
-            })?;
-        }
-        let white = self.whitening.transpose() * cross;
-        let own = self.whitening.transpose() * self.linearization.descent();
-        Ok(Projection {
-            left: &squares - white.transpose() * &white,
-            score: with_residual - white.transpose() * &own,
-            squares: squares.diagonal(),
-            cost: self.linearization.cost - own.norm_squared(),
-        })
-    }
 }
 
-/// Makes columns (samples, outputs) of an experiment.
-type Columns<'a> = &'a dyn Fn(&Signals, &Matrix, &Experiment, usize) -> Result<Vec<Matrix>, Error>;
-
-/// A column of which a smaller part is left is the base model's own.
-pub(crate) const LEFT: f64 = 1e-7;
-
-/// Columns beside the base model's sensitivities.
-pub(crate) struct Projection {
-    /// Inner products of what is left of the columns.
-    pub left: Matrix,
-    /// Inner products of what is left with the residual.
-    pub score: DVector<f64>,
-    /// Squares of the columns as they were.
-    pub squares: DVector<f64>,
-    /// What the base model would leave of the residual's squares by itself.
-    pub cost: f64,
+/// What a candidate would take, whose columns begin at `first`.
+fn scored(candidate: &Candidate, first: usize, projection: &Projection) -> Score {
+    let Projection { left, score, squares, cost } = projection;
+    let places: Vec<usize> = (first..first + candidate.probes.len())
+        .filter(|&i| left[(i, i)] > LEFT * squares[i])
+        .collect();
+    let own = Matrix::from_fn(places.len(), places.len(), |i, j| left[(places[i], places[j])]);
+    let rhs = DVector::from_fn(places.len(), |i, _| score[places[i]]);
+    let solution = solve_scaled(own, &rhs);
+    let gain = solution.dot(&rhs) / cost.max(f64::MIN_POSITIVE);
+    let mut coefficients = vec![0.0; candidate.probes.len()];
+    for (value, &place) in solution.iter().zip(&places) {
+        coefficients[place - first] = *value;
+    }
+    Score {
+        start: candidate.start(&coefficients),
+        zero: candidate.linear.then(|| candidate.block.clone()),
+        gain: gain.clamp(0.0, 1.0),
+        columns: places.len(),
+    }
 }
 
 /// The least squares solution of symmetric equations, directions without power left out.

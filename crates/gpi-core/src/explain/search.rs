@@ -136,11 +136,10 @@ impl<'a> Search<'a> {
             let is_substantial = takes(SUBSTANTIAL, trial.cost, self.cost)
                 && takes(HELD_OUT, sum(&trial.held_out), sum(&before));
             let name = trial.entry.name;
-            // more of what is named already is no new name
-            let is_named =
-                trial.entry.driven && self.point.effects.iter().any(|effect| effect.name() == name);
-            let is_weighty =
-                is_substantial || is_named || trial.cost < NEAR * floor || SIGNED.contains(&name);
+            let is_weighty = is_substantial
+                || self.is_named(trial.entry)
+                || trial.cost < NEAR * floor
+                || SIGNED.contains(&name);
             let is_more = trial.is_driven && trial.deviance > trial.chance;
             is_more && is_weighty && is_confirmed(&before, &trial.held_out)
         };

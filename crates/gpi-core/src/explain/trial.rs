@@ -128,6 +128,11 @@ impl Search<'_> {
         Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })
     }
 
+    /// Whether it is more of an effect that the input drives and that the model has already: no new name.
+    pub(super) fn is_named(&self, entry: &Entry) -> bool {
+        entry.driven && self.point.effects.iter().any(|effect| effect.name() == entry.name)
+    }
+
     /// Whether every effect has values that a thing could have.
     pub(super) fn is_plausible(&self, point: &Point) -> bool {
         let record = &self.prepared.record;
@@ -154,11 +159,13 @@ impl Search<'_> {
         const LOOKS: f64 = 150.0;
         let deviance = values * (self.cost / cost.max(f64::MIN_POSITIVE)).ln();
         let white = added.max(1) as f64 * values.ln() + 2.0 * LOOKS.ln();
-        let mut chance = white.max(LEAST * values);
         /// What no colour makes chance of.
         const BEYOND_COLOUR: f64 = 50.0;
-        let few = representatives(&point, &self.prepared.record, length(&point));
-        let is_certain = few.is_some() && deviance > BEYOND_COLOUR * white;
+        let is_long = representatives(&point, &self.prepared.record, length(&point)).is_some();
+        // more of what a long record has named needs no weight, and its held-out blocks see through colour
+        let is_named = is_long && self.is_named(entry);
+        let is_certain = is_named || is_long && deviance > BEYOND_COLOUR * white;
+        let mut chance = if is_named { white } else { white.max(LEAST * values) };
         if deviance > chance && !is_certain {
             let refined = Refined { fitted, options, outliers: 0, robust: false };
             let uncertainty = refined.uncertainty(&self.prepared.record, progress)?;

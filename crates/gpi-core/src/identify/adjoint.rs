@@ -6,7 +6,7 @@ use super::point::{Freedom, Layout, Point};
 use super::stream::Stream;
 use super::tangents::{Trace, by_states, sensed};
 use crate::effects::{InnerLoop, Law, Sees, Slope};
-use crate::linear::Section;
+use crate::linear::{Section, dot};
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{DMatrixView, DVector};
 use rayon::prelude::*;
@@ -257,10 +257,6 @@ impl<'a> Back<'a> {
             first += order;
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn add(sum: &mut [f64], factor: f64, values: &[f64]) {

@@ -29,7 +29,7 @@ fn stiffness() -> Stiffness {
 }
 
 /// Two inputs and two outputs, with every kind of thing in the loops and behind them.
-pub(super) fn model() -> Model {
+pub(crate) fn model() -> Model {
     let a = [0.6, 0.5, 0.1, -0.4, 0.5, 0.0, 0.0, 0.1, 0.7];
     let linear = StateSpace::new(
         Matrix::from_row_slice(STATES, STATES, &a),
@@ -56,7 +56,7 @@ pub(super) fn model() -> Model {
 }
 
 /// An experiment of so much swing, from rest or in motion.
-pub(super) fn run(
+pub(crate) fn run(
     swing: f64,
     first: f64,
     warmup: usize,
@@ -71,6 +71,6 @@ pub(super) fn run(
     Experiment { input, output, covariates: Matrix::zeros(700, 0), warmup, held_out }
 }
 
-pub(super) fn record(model: &Model, runs: Vec<Experiment>) -> Record {
+pub(crate) fn record(model: &Model, runs: Vec<Experiment>) -> Record {
     Record::new(runs, 100.0, model.inputs().to_vec(), model.outputs().to_vec(), vec![]).unwrap()
 }

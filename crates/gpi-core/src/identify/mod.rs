@@ -25,7 +25,7 @@ mod lanes;
 pub(crate) mod levenberg_marquardt;
 pub(crate) mod linearization;
 #[cfg(test)]
-mod looped;
+pub(crate) mod looped;
 mod motion;
 mod names;
 pub(crate) mod noise_floor;

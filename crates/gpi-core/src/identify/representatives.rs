@@ -27,7 +27,7 @@ pub(crate) fn representatives(
     /// Products of a Gram matrix that take long.
     const LONG: f64 = 1e10;
     /// Values for each unknown that are enough.
-    const ENOUGH: f64 = 40.0;
+    const ENOUGH: f64 = 25.0;
     /// Small, middle and large swings.
     const FEWEST: f64 = 3.0;
     /// Part of the record from which on choosing saves too little.

@@ -1,6 +1,7 @@
 //! Matrix decompositions by faer, on the matrices that the rest of the crate holds.
 
 use crate::{Error, Matrix};
+use faer::linalg::solvers::Solve;
 use faer::{MatRef, Side};
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -76,6 +77,13 @@ pub(crate) fn eigen(
         DVector::from_fn(n, |i, _| values[i]),
         nalgebra::DMatrix::from_fn(n, n, |i, j| vectors[(i, j)]),
     ))
+}
+
+/// Solves `matrix x = right` with a symmetric matrix, whose lower triangle is read; `None` where it is not positive.
+pub(crate) fn solve_positive(matrix: &Matrix, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let right = MatRef::from_column_major_slice(right.as_slice(), right.len(), 1);
+    let found = view(matrix).llt(Side::Lower).ok()?.solve(right);
+    Some(DVector::from_fn(found.nrows(), |i, _| found[(i, 0)]))
 }
 
 /// Solves `matrix x = right`; `None` where the matrix is singular. Nothing to solve is solved.

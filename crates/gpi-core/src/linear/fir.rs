@@ -1,6 +1,6 @@
 //! Finite impulse response by least squares: the first stage of the chain.
 
-use super::NormalEquations;
+use super::{NormalEquations, dot};
 use crate::{Error, Experiment, Matrix, Record};
 
 /// A finite impulse response model, equation (17) of the paper:
@@ -230,17 +230,4 @@ fn accumulate(
 
 fn mean_of_none(matrix: &Matrix) -> Vector {
     Vector::zeros(matrix.ncols())
-}
-
-/// The dot product, in eight independent sums that the compiler can keep in vector registers.
-fn dot(left: &[f64], right: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (left, right) = (left.chunks_exact(8), right.chunks_exact(8));
-    let rest: f64 = left.remainder().iter().zip(right.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in left.zip(right) {
-        for i in 0..8 {
-            sums[i] += a[i] * b[i];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
 }

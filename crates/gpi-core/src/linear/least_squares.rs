@@ -1,6 +1,6 @@
 //! Least squares from normal equations, with rank and condition, free or non-negative.
 
-use super::decompose::symmetric_eigen;
+use super::decompose::{solve_positive, symmetric_eigen};
 use crate::{Error, Matrix};
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, MatMut, MatRef, Par};
@@ -183,8 +183,14 @@ fn passive_solution(
     let reduced = Matrix::from_fn(free.len(), free.len(), |i, j| gram[(free[i], free[j])]);
     let target = DVector::from_fn(free.len(), |i, _| remaining[free[i]]);
     let mut solution = x.clone();
-    if let Some(factor) = reduced.cholesky() {
-        let values = factor.solve(&target);
+    /// From so many unknowns on faer's blocks are faster, which keep megabytes of workspace.
+    const LARGE: usize = 300;
+    let values = if free.len() > LARGE {
+        solve_positive(&reduced, &target)
+    } else {
+        reduced.cholesky().map(|factor| factor.solve(&target))
+    };
+    if let Some(values) = values {
         for (&i, value) in free.iter().zip(values.iter()) {
             solution[i] = *value;
         }

@@ -1,6 +1,7 @@
 //! The linear dynamics G: estimated, realized, simulated, and run backwards.
 
 mod decompose;
+mod dot;
 mod era;
 mod fir;
 mod laurent;
@@ -19,6 +20,7 @@ pub use transfer_function::TransferFunction;
 pub use zero_order_hold::zero_order_hold;
 
 pub(crate) use decompose::symmetric_eigen;
+pub(crate) use dot::dot;
 pub(crate) use era::Hankel;
 pub(crate) use fir::excitation_limit;
 pub(crate) use least_squares::{NormalEquations, bounded};

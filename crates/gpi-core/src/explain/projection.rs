@@ -1,0 +1,170 @@
+//! Candidates' columns beside the model's own sensitivities: what the model could absorb does not count.
+
+use super::score::Base;
+use crate::effects::{Candidate, Effect, Stage};
+use crate::identify::free_run::Signals;
+use crate::identify::linearization::{Linearization, gather};
+use crate::identify::stream::{Rows, Stream};
+use crate::{Error, Experiment, Matrix};
+use nalgebra::DVector;
+
+/// Makes columns (samples, outputs) of an experiment.
+type Columns<'a> = &'a dyn Fn(&Signals, &Matrix, &Experiment, usize) -> Result<Vec<Matrix>, Error>;
+
+/// A column of which a smaller part is left is the base model's own.
+pub(crate) const LEFT: f64 = 1e-7;
+
+/// Columns beside the base model's sensitivities.
+pub(crate) struct Projection {
+    /// Inner products of what is left of the columns.
+    pub left: Matrix,
+    /// Inner products of what is left with the residual.
+    pub score: DVector<f64>,
+    /// Squares of the columns as they were.
+    pub squares: DVector<f64>,
+    /// What the base model would leave of the residual's squares by itself.
+    pub cost: f64,
+}
+
+impl Base<'_> {
+    /// So many columns beside the model's own, projected off its sensitivities. `columns` makes them for an
+    /// experiment from the signals and the output, and its place.
+    pub(crate) fn project(&self, n: usize, columns: Columns) -> Result<Projection, Error> {
+        let unknowns = self.linearization.layout.len;
+        let mut cross = Matrix::zeros(unknowns, n);
+        let mut squares = Matrix::zeros(n, n);
+        let mut with_residual = DVector::zeros(n);
+        for (index, experiment) in self.record.experiments().iter().enumerate() {
+            let known = &self.signals[index];
+            let here = self.point.output_from(Stage::Added, known, experiment, index)?;
+            let columns = columns(known, &here, experiment, index)?;
+            let places: Vec<usize> = experiment.scored_runs().flatten().collect();
+            let mut first = 0;
+            let derivatives = self.freedom.derivatives;
+            let layout = &self.linearization.layout;
+            let stream = Stream::new(self.point, layout, derivatives, experiment, index)?;
+            gather(stream, &mut || Ok(()), |Rows { regressors, residuals }| {
+                let count = residuals.ncols();
+                let places = &places[first..first + count];
+                for (output, regressor) in regressors.iter().enumerate() {
+                    let own = Matrix::from_fn(count, n, |row, column| {
+                        columns[column][(places[row], output)]
+                    });
+                    let residual = residuals.row(output).transpose();
+                    let weights = residual.map(|value| self.weighting.of(output, value).0);
+                    let mut weighted = own.clone();
+                    for mut column in weighted.column_iter_mut() {
+                        column.component_mul_assign(&weights);
+                    }
+                    cross.gemm(1.0, regressor, &weighted, 1.0);
+                    squares.gemm_tr(1.0, &own, &weighted, 1.0);
+                    with_residual.gemv_tr(1.0, &weighted, &residual, 1.0);
+                }
+                first += count;
+            })?;
+        }
+        Ok(self.projected(&cross, &squares, with_residual))
+    }
+
+    /// Columns by their inner products with the model's sensitivities, with each other and with the residual.
+    fn projected(
+        &self,
+        cross: &Matrix,
+        squares: &Matrix,
+        with_residual: DVector<f64>,
+    ) -> Projection {
+        let white = self.whitening.tr_mul(cross);
+        let own = self.whitening.tr_mul(&self.linearization.descent());
+        Projection {
+            left: squares - white.tr_mul(&white),
+            score: with_residual - white.tr_mul(&own),
+            squares: squares.diagonal(),
+            cost: self.linearization.cost - own.norm_squared(),
+        }
+    }
+
+    /// The same as [`Base::project`] for loops around G, whose columns are the derivatives by their values; `None`
+    /// for what has no loops.
+    pub(super) fn loops_projected(
+        &self,
+        candidate: &Candidate,
+    ) -> Result<Option<Projection>, Error> {
+        let block = candidate.block.block();
+        let point = self.point.with_effect(candidate.block.clone());
+        let place = point.effects.iter().position(|own| *own == candidate.block);
+        let Some(place) = place.filter(|_| candidate.linear && !block.loops().is_empty()) else {
+            return Ok(None);
+        };
+        let mut check = || Ok(());
+        let Linearization { equations, layout, .. } =
+            Linearization::new(&point, self.record, self.freedom, self.weighting, &mut check)?;
+        let inserted = layout.effects[place].clone();
+        let known: Vec<usize> = (0..layout.len).filter(|i| !inserted.contains(i)).collect();
+        let (values, steps) = (block.values(), block.steps());
+        let moved = |probe: &Effect| {
+            let pairs = probe.block().values().into_iter().zip(&values);
+            pairs.into_iter().position(|(probe, value)| probe != *value)
+        };
+        let own: Vec<usize> = candidate.probes.iter().filter_map(moved).collect();
+        let (gram, n) = (&equations.gram, own.len());
+        let unknown = |i: usize| inserted.start + own[i];
+        let step = |i: usize| steps[own[i]];
+        let cross = Matrix::from_fn(known.len(), n, |i, j| gram[(known[i], unknown(j))] * step(j));
+        let squares =
+            Matrix::from_fn(n, n, |i, j| gram[(unknown(i), unknown(j))] * step(i) * step(j));
+        let with_residual = DVector::from_fn(n, |i, _| equations.rhs[(unknown(i), 0)] * step(i));
+        Ok(Some(self.projected(&cross, &squares, with_residual)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::{InnerLoop, Law, Sees, Stiffness};
+    use crate::identify::linearization::Weighting;
+    use crate::identify::looped::{model, record, run};
+    use crate::identify::point::{DynamicsFreedom, Freedom};
+    use crate::identify::preparation::Prepared;
+    use crate::identify::sensitivity::{Derivatives, Parameters};
+
+    #[test]
+    fn columns_of_loops_are_their_derivatives() {
+        let model = model();
+        let record = record(&model, vec![run(1.5, 0.0, 100, vec![250..300, 400..420]); 2]);
+        let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
+        let prepared = Prepared::new(&record, channels).unwrap();
+        let point = prepared.point_of(&model).unwrap();
+        let freedom = Freedom {
+            weights: true,
+            derivatives: Derivatives { thresholds: false, half_widths: false, starts: false },
+            identity: true,
+            dynamics: DynamicsFreedom::Everything,
+        };
+        let weighting = Weighting { outputs: vec![1.0, 0.4], turns: vec![f64::INFINITY; 2] };
+        let base = Base::new(&point, &prepared.record, freedom, &weighting).unwrap();
+        let inner = |law| InnerLoop {
+            sees: Sees::Mixture { states: vec![0.3, 0.5, -0.2], inputs: vec![0.1, 0.2] },
+            law,
+            drives: vec![0.0; 3],
+        };
+        let stops = Law::Stops { half_widths: vec![0.1, 0.6], weights: vec![0.5, 1.0] };
+        let square = Law::Power { exponent: 2, scale: 1.5 };
+        let block = Stiffness { loops: vec![inner(stops), inner(square)] };
+        // drives of the first loop, and of the second behind what the first one sees and weighs
+        let candidate = Candidate::linear(block, (0..3).chain(12..15));
+        let found = base.loops_projected(&candidate).unwrap().unwrap();
+        let columns = |known: &Signals, here: &Matrix, own: &Experiment, index: usize| {
+            let gained = |probe: &Effect| point.gained_by(probe, known, here, own, index);
+            candidate.probes.iter().map(gained).collect()
+        };
+        let expected = base.project(candidate.probes.len(), &columns).unwrap();
+        for i in 0..candidate.probes.len() {
+            let size = expected.squares[i];
+            assert!(size > 0.0);
+            assert!((found.squares[i] - size).abs() < 1e-5 * size, "{i}");
+            assert!((found.left[(i, i)] - expected.left[(i, i)]).abs() < 1e-5 * size, "{i}");
+            let scale = (size * expected.cost).sqrt();
+            assert!((found.score[i] - expected.score[i]).abs() < 1e-5 * scale, "{i}");
+        }
+    }
+}
