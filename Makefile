@@ -17,7 +17,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # The order of `make test` is part of what it promises, also under `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench figures monte-carlo scoreboard blind-exam clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench bench-peers figures monte-carlo scoreboard blind-exam clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -64,6 +64,10 @@ test-python: $(NATIVE) ## pytest
 
 bench: ## Run the benchmarks
 	cargo bench
+
+bench-peers: $(NATIVE) ## Time the same work here and in other tools, into docs/benchmarks.md
+	$(BIN)/python -m pip install --quiet --group peers
+	$(BIN)/python tools/bench_peers.py --markdown docs/benchmarks.md
 
 figures: $(NATIVE) ## Print the figures of README; needs the measured data
 	$(BIN)/python tools/measured_figures.py

@@ -4,7 +4,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use gpi_core::operators::{Deadzones, Gpi, Operator, PlayBank, Reading};
 use std::hint::black_box;
 
-const SAMPLES: usize = 10_000;
+const SAMPLES: usize = 100_000;
 
 fn smooth() -> Vec<f64> {
     (0..SAMPLES)

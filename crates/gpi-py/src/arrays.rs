@@ -33,7 +33,9 @@ fn dimensions<T>(name: &str, shape: &[usize], expected: &str) -> PyResult<T> {
 /// A vector.
 pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     with_array(name, value, |array| match array.ndim() {
-        0 | 1 => Ok(array.iter().copied().collect()),
+        0 | 1 => {
+            Ok(array.as_slice().map_or_else(|| array.iter().copied().collect(), <[_]>::to_vec))
+        }
         _ => dimensions(name, array.shape(), "a vector"),
     })
 }
@@ -86,7 +88,12 @@ pub(crate) fn markov(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Matri
 }
 
 pub(crate) fn from_vector<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyAny> {
-    Array1::from_vec(values.to_vec()).into_pyarray(py).into_any()
+    from_owned(py, values.to_vec())
+}
+
+/// An array of these values, which are not copied.
+pub(crate) fn from_owned<'py>(py: Python<'py>, values: Vec<f64>) -> Bound<'py, PyAny> {
+    Array1::from_vec(values).into_pyarray(py).into_any()
 }
 
 pub(crate) fn from_complex<'py>(py: Python<'py>, values: Vec<Complex64>) -> Bound<'py, PyAny> {

@@ -1,6 +1,6 @@
 //! Deadzones, plays and their cascade.
 
-use crate::arrays::{from_vector, vector};
+use crate::arrays::{from_owned, from_vector, vector};
 use crate::errors::{parameter, to_python};
 use gpi_core::Hysteresis;
 use gpi_core::operators::{self, DeadzonesState, GpiState, Operator, Reading};
@@ -85,8 +85,8 @@ impl PlayBank {
             None => self.bank.rest(),
         };
         let mut signal = vector("z", z)?;
-        self.bank.in_place(&mut state, &mut signal);
-        Ok((from_vector(z.py(), &signal), from_vector(z.py(), state.plays())))
+        z.py().detach(|| self.bank.in_place(&mut state, &mut signal));
+        Ok((from_owned(z.py(), signal), from_vector(z.py(), state.plays())))
     }
 
     fn __repr__(&self) -> String {
@@ -199,8 +199,8 @@ impl Deadzones {
     ) -> PyResult<(Bound<'py, PyAny>, f64)> {
         let mut state = DeadzonesState { previous: previous.unwrap_or(0.0) };
         let mut signal = vector("u", u)?;
-        self.envelope.in_place(&mut state, &mut signal);
-        Ok((from_vector(u.py(), &signal), state.previous))
+        u.py().detach(|| self.envelope.in_place(&mut state, &mut signal));
+        Ok((from_owned(u.py(), signal), state.previous))
     }
 
     fn __repr__(&self) -> String {
@@ -277,8 +277,8 @@ impl Gpi {
             None => self.hysteresis.rest(),
         };
         let mut signal = vector("u", u)?;
-        self.hysteresis.in_place(&mut state, &mut signal);
-        Ok((from_vector(u.py(), &signal), from_vector(u.py(), &write_state(&state))))
+        u.py().detach(|| self.hysteresis.in_place(&mut state, &mut signal));
+        Ok((from_owned(u.py(), signal), from_vector(u.py(), &write_state(&state))))
     }
 
     fn __repr__(&self) -> String {

@@ -69,6 +69,17 @@ where
         let z = self.envelope.step(&mut state.envelope, input);
         self.plays.step(&mut state.plays, z)
     }
+
+    fn block(&self, state: &mut Self::State, input: &[E::Item], output: &mut [E::Item]) -> usize {
+        let samples = self.envelope.block(&mut state.envelope, input, output);
+        self.plays.in_place(&mut state.plays, &mut output[..samples]);
+        samples
+    }
+
+    fn in_place(&self, state: &mut Self::State, signal: &mut [E::Item]) {
+        self.envelope.in_place(&mut state.envelope, signal);
+        self.plays.in_place(&mut state.plays, signal);
+    }
 }
 
 #[cfg(test)]

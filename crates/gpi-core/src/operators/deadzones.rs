@@ -133,6 +133,43 @@ impl<S: Storage> Operator for Deadzones<S> {
         state.previous = input;
         sum
     }
+
+    fn block(
+        &self,
+        state: &mut DeadzonesState<S::Item>,
+        input: &[S::Item],
+        output: &mut [S::Item],
+    ) -> usize {
+        let samples = input.len().min(output.len());
+        output[..samples].copy_from_slice(&input[..samples]);
+        self.in_place(state, &mut output[..samples]);
+        samples
+    }
+
+    /// On a host all deadzones are one piecewise linear curve to a long record, whose cost hardly grows with their
+    /// number. The same as [`Operator::step`] up to rounding.
+    fn in_place(&self, state: &mut DeadzonesState<S::Item>, signal: &mut [S::Item]) {
+        #[cfg(feature = "identify")]
+        {
+            use super::block::zones;
+            let (thresholds, weights) = (self.thresholds.values(), self.weights.values());
+            let previous = core::slice::from_mut(&mut state.previous);
+            if zones::pays(thresholds.len(), signal.len())
+                && let (Some(thresholds), Some(weights), Some([previous]), Some(signal)) = (
+                    S::Item::doubles(thresholds),
+                    S::Item::doubles(weights),
+                    S::Item::doubles_mut(previous),
+                    S::Item::doubles_mut(signal),
+                )
+                && zones::in_place(thresholds, weights, self.reading, previous, signal)
+            {
+                return;
+            }
+        }
+        for value in signal {
+            *value = self.step(state, *value);
+        }
+    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,8 @@
 //! drive any number of channels. Every operator is a [`Operator::step`] first; the block forms run
 //! the same arithmetic over a whole record.
 
+#[cfg(feature = "identify")]
+mod block;
 mod cascade;
 mod deadzones;
 mod error;

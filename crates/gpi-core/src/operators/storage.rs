@@ -18,21 +18,39 @@ pub trait Sample:
     const ONE: Self;
     /// Neither NaN nor infinite.
     fn finite(self) -> bool;
+    /// The values, where they are `f64`.
+    fn doubles(_: &[Self]) -> Option<&[f64]> {
+        None
+    }
+    /// The values, to be changed, where they are `f64`.
+    fn doubles_mut(_: &mut [Self]) -> Option<&mut [f64]> {
+        None
+    }
 }
 
 macro_rules! impl_sample {
-    ($($number:ty),*) => {$(
+    ($number:ty, $($doubles:item)*) => {
         impl Sample for $number {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
             fn finite(self) -> bool {
                 self.is_finite()
             }
+            $($doubles)*
         }
-    )*};
+    };
 }
 
-impl_sample!(f32, f64);
+impl_sample!(f32,);
+impl_sample! {
+    f64,
+    fn doubles(values: &[Self]) -> Option<&[f64]> {
+        Some(values)
+    }
+    fn doubles_mut(values: &mut [Self]) -> Option<&mut [f64]> {
+        Some(values)
+    }
+}
 
 /// An array of samples: `[T; N]` on firmware (no heap), `Vec<T>` on a host.
 pub trait Storage: Clone {

@@ -1,0 +1,83 @@
+//! Where a number stands among sorted ones, at a cost that does not grow with how many there are.
+
+/// Sorted numbers in buckets.
+pub(super) struct Knots {
+    values: Vec<f64>,
+    buckets: Vec<Bucket>,
+    lowest: f64,
+    scale: f64,
+}
+
+/// The numbers of a part of their range.
+#[derive(Clone, Copy)]
+struct Bucket {
+    /// Infinite where it holds none.
+    first: f64,
+    /// How many are in earlier buckets.
+    before: usize,
+    count: usize,
+}
+
+impl Knots {
+    /// Of sorted finite numbers.
+    pub(super) fn new(values: Vec<f64>) -> Self {
+        /// Buckets for each number: most hold one at most.
+        const SPARSE: usize = 4;
+        let (lowest, highest) = match &values[..] {
+            [lowest, .., highest] => (*lowest, *highest),
+            _ => (0.0, 0.0),
+        };
+        let last = SPARSE * values.len();
+        let scale = last as f64 / (highest - lowest);
+        let scale = if scale.is_finite() { scale } else { 0.0 };
+        let empty = Bucket { first: f64::INFINITY, before: 0, count: 0 };
+        let mut knots = Self { values, buckets: vec![empty; last + 1], lowest, scale };
+        for i in 0..knots.values.len() {
+            let (value, bucket) = (knots.values[i], knots.bucket(knots.values[i]));
+            let bucket = &mut knots.buckets[bucket];
+            bucket.first = bucket.first.min(value);
+            bucket.count += 1;
+        }
+        let mut before = 0;
+        for bucket in &mut knots.buckets {
+            bucket.before = before;
+            before += bucket.count;
+        }
+        knots
+    }
+
+    /// It keeps the order of numbers: all in an earlier bucket are smaller.
+    #[inline(always)]
+    fn bucket(&self, x: f64) -> usize {
+        (((x - self.lowest) * self.scale) as usize).min(self.buckets.len() - 1)
+    }
+
+    /// How many are at most x.
+    #[inline(always)]
+    pub(super) fn at_most(&self, x: f64) -> usize {
+        let Bucket { first, before, count } = self.buckets[self.bucket(x)];
+        if count <= 1 {
+            return before + usize::from(first <= x);
+        }
+        before + self.values[before..before + count].partition_point(|&value| value <= x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_also_where_numbers_crowd() {
+        let crowded = (0..100).map(|i| 1e-3 * f64::from(i));
+        let mut values: Vec<f64> = crowded.chain([-3.0, 0.0, 0.05, 5.0, 1e3]).collect();
+        values.sort_by(f64::total_cmp);
+        let knots = Knots::new(values.clone());
+        for x in values.iter().flat_map(|&x| [x - 0.1, 0.999 * x, x, 1.001 * x, x + 0.1]) {
+            assert_eq!(knots.at_most(x), values.iter().filter(|v| **v <= x).count(), "{x}");
+        }
+        assert_eq!(Knots::new(vec![0.0, 0.0]).at_most(0.0), 2);
+        assert_eq!(Knots::new(vec![2.0]).at_most(1.0), 0);
+        assert_eq!(Knots::new(vec![]).at_most(1.0), 0);
+    }
+}

@@ -1,0 +1,8 @@
+//! The operators over long records, at a cost that hardly grows with their number of plays or deadzones.
+
+pub(super) mod bank;
+mod knots;
+mod lanes;
+mod ranked;
+mod turning_points;
+pub(super) mod zones;

@@ -1,0 +1,51 @@
+//! The half-widths of a bank in order, with sums over those below.
+
+use super::knots::Knots;
+
+/// Plays by half-width.
+pub(super) struct Ranked {
+    /// Places in the bank, by half-width.
+    pub order: Vec<usize>,
+    /// r, in order.
+    pub half_widths: Vec<f64>,
+    /// Sums of p over the first so many plays.
+    pub weights: Vec<f64>,
+    /// Sums of p r over the first so many plays.
+    pub moments: Vec<f64>,
+    knots: Knots,
+}
+
+impl Ranked {
+    pub(super) fn new(half_widths: &[f64], weights: &[f64]) -> Self {
+        let mut order: Vec<usize> = (0..half_widths.len()).collect();
+        order.sort_by(|&i, &j| half_widths[i].total_cmp(&half_widths[j]));
+        let sorted: Vec<f64> = order.iter().map(|&i| half_widths[i]).collect();
+        Self {
+            weights: sums(order.iter().map(|&i| weights[i])),
+            moments: sums(order.iter().map(|&i| weights[i] * half_widths[i])),
+            knots: Knots::new(sorted.clone()),
+            half_widths: sorted,
+            order,
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// How many half-widths are at most x.
+    #[inline(always)]
+    pub(super) fn at_most(&self, x: f64) -> usize {
+        self.knots.at_most(x)
+    }
+}
+
+/// The sum of no term, of the first one, of the first two, ...
+pub(super) fn sums(terms: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut sum = 0.0;
+    let later = terms.map(|term| {
+        sum += term;
+        sum
+    });
+    std::iter::once(0.0).chain(later).collect()
+}

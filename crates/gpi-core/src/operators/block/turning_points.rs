@@ -1,0 +1,240 @@
+//! A bank of plays by its turning points: a sample costs the same whatever the number of plays.
+//!
+//! Along a branch that began at a turning point the narrowest plays move, `F_i = z - s r_i` with s = 1 where z rises
+//! and -1 where it falls, and the others stand where earlier branches left them. So
+//! `v = P_c z - s Q_c + R_c`, with P_c and Q_c the sums of p_i and p_i r_i over the c plays that move, and R_c that of
+//! `p_i F_i` over those that stand; c grows as z goes on, and a reversal starts again with none.
+
+use super::ranked::Ranked;
+use pulp::Simd;
+
+/// Samples that are taken at once where z goes on and no further play starts to move.
+const RUN: usize = 8;
+
+/// A branch that has ended: where its plays stand that no later branch has moved.
+struct Turn {
+    /// The plays from the end of the next later branch to here are its own.
+    end: usize,
+    /// z at its end.
+    z: f64,
+    /// 1 where it rose, -1 where it fell.
+    sign: f64,
+    /// Sum of `p F` over the plays from `end` on.
+    rest: f64,
+}
+
+/// Where all plays stand.
+pub(super) struct TurningPoints<'a> {
+    bank: &'a Ranked,
+    /// Where the plays stood that no branch has moved yet, by half-width, and sums of `p F` from each on.
+    places: Vec<f64>,
+    rests: Vec<f64>,
+    /// The earliest, which moved the widest plays, comes first.
+    turns: Vec<Turn>,
+    /// Of the present branch.
+    sign: f64,
+    last: f64,
+    /// How many plays move.
+    moving: usize,
+    /// The `sign * z` from which on more of them move.
+    limit: f64,
+    /// Sum of `p F` over those that stand.
+    rest: f64,
+    /// `v = slope z + constant`.
+    slope: f64,
+    constant: f64,
+}
+
+impl<'a> TurningPoints<'a> {
+    /// Plays that stand at `places` (in the bank's order) before a signal that begins at `first`; `None` where a wider
+    /// play stands so far from a narrower one that the narrower may move after it.
+    pub(super) fn new(
+        bank: &'a Ranked,
+        weights: &[f64],
+        places: &[f64],
+        first: f64,
+    ) -> Option<Self> {
+        /// Of rounding, relative to all that plays are compared with.
+        const SLACK: f64 = 1e-13;
+        let places: Vec<f64> = bank.order.iter().map(|&i| places[i]).collect();
+        let widest = bank.half_widths.last().copied().unwrap_or(0.0);
+        let size = places.iter().fold(widest + first.abs(), |size, place| size.max(place.abs()));
+        let neighbours = places.windows(2).zip(bank.half_widths.windows(2));
+        for (places, widths) in neighbours {
+            if (places[1] - places[0]).abs() > widths[1] - widths[0] + SLACK * size {
+                return None;
+            }
+        }
+        let mut rests = vec![0.0; places.len() + 1];
+        for (rank, &i) in bank.order.iter().enumerate().rev() {
+            rests[rank] = rests[rank + 1] + weights[i] * places[rank];
+        }
+        // all plays stand: towards `first` is as good a direction as any
+        let sign = match places.first() {
+            Some(narrowest) if first < *narrowest => -1.0,
+            _ => 1.0,
+        };
+        let turns = Vec::new();
+        let (moving, limit, rest) = (0, f64::INFINITY, 0.0);
+        let (slope, constant) = (0.0, 0.0);
+        let mut found = Self {
+            bank,
+            places,
+            rests,
+            turns,
+            sign,
+            last: first,
+            moving,
+            limit,
+            rest,
+            slope,
+            constant,
+        };
+        found.look_ahead();
+        found.settle();
+        Some(found)
+    }
+
+    /// Writes where the plays stand, in the bank's order.
+    pub(super) fn write_places(&self, places: &mut [f64]) {
+        let mut rank = 0;
+        let present = Turn { end: self.moving, z: self.last, sign: self.sign, rest: 0.0 };
+        for turn in std::iter::once(&present).chain(self.turns.iter().rev()) {
+            while rank < turn.end {
+                places[self.bank.order[rank]] = turn.z - turn.sign * self.bank.half_widths[rank];
+                rank += 1;
+            }
+        }
+        for rank in rank..self.bank.len() {
+            places[self.bank.order[rank]] = self.places[rank];
+        }
+    }
+
+    /// From where on more plays move.
+    #[inline(always)]
+    fn look_ahead(&mut self) {
+        let (half_widths, c) = (&self.bank.half_widths, self.moving);
+        self.limit = match self.turns.last() {
+            Some(turn) if turn.sign == self.sign => self.sign * turn.z,
+            Some(turn) => self.sign * turn.z + 2.0 * half_widths[c],
+            None if c < self.places.len() => self.sign * self.places[c] + half_widths[c],
+            None => f64::INFINITY,
+        };
+    }
+
+    /// How v follows z.
+    #[inline(always)]
+    fn settle(&mut self) {
+        let (Ranked { weights, moments, .. }, c) = (self.bank, self.moving);
+        self.rest = match self.turns.last() {
+            Some(turn) => {
+                (weights[turn.end] - weights[c]) * turn.z
+                    - turn.sign * (moments[turn.end] - moments[c])
+                    + turn.rest
+            }
+            None => self.rests[c],
+        };
+        self.slope = weights[c];
+        self.constant = self.rest - self.sign * moments[c];
+    }
+
+    /// One sample.
+    #[inline(always)]
+    fn step(&mut self, z: f64) -> f64 {
+        let turned = self.sign * (z - self.last) < 0.0;
+        if turned {
+            if self.moving > 0 {
+                let Self { moving: end, last: z, sign, rest, .. } = *self;
+                self.turns.push(Turn { end, z, sign, rest });
+            }
+            self.sign = -self.sign;
+            self.moving = 0;
+            self.look_ahead();
+        }
+        if turned || self.sign * z >= self.limit {
+            while self.sign * z >= self.limit {
+                self.go_on(z);
+            }
+            self.settle();
+        }
+        self.last = z;
+        self.slope * z + self.constant
+    }
+
+    /// More plays move: as many of the latest earlier branch as z has come to.
+    #[inline(always)]
+    fn go_on(&mut self, z: f64) {
+        let (s, next) = (self.sign, self.moving + 1);
+        self.moving = match self.turns.last() {
+            Some(turn) => {
+                let met = if turn.sign == s {
+                    turn.end
+                } else {
+                    self.bank.at_most(0.5 * s * (z - turn.z)).clamp(next, turn.end)
+                };
+                if met == turn.end {
+                    self.turns.pop();
+                }
+                met
+            }
+            None => {
+                let standing = self.places[next..].iter().zip(&self.bank.half_widths[next..]);
+                next + standing.take_while(|(place, r)| s * z >= s * *place + *r).count()
+            }
+        };
+        self.look_ahead();
+    }
+
+    /// The outputs of finite samples.
+    #[inline(always)]
+    pub(super) fn run<S: Simd>(&mut self, simd: S, input: &[f64], output: &mut [f64]) {
+        /// Samples in a row without a reversal after which there may be more of them.
+        const QUIET: usize = 3;
+        let mut quiet = 0;
+        let mut k = 0;
+        while k < input.len() {
+            let before = self.sign;
+            output[k] = self.step(input[k]);
+            quiet = if self.sign == before { quiet + 1 } else { 0 };
+            k += 1;
+            if quiet < QUIET {
+                continue;
+            }
+            while let (Some(passed), Some(now), Some(out)) = (
+                input[k - 1..].first_chunk::<RUN>(),
+                input[k..].first_chunk::<RUN>(),
+                output[k..].first_chunk_mut::<RUN>(),
+            ) {
+                let ends_before = self.sign * now[RUN - 1] < self.limit;
+                if !ends_before || !goes_on(simd, passed, now, self.sign) {
+                    break;
+                }
+                line(simd, now, self.slope, self.constant, out);
+                self.last = now[RUN - 1];
+                k += RUN;
+            }
+        }
+    }
+}
+
+/// Whether each sample goes on from the one before in the direction of `sign`, or stands.
+#[inline(always)]
+fn goes_on<S: Simd>(simd: S, passed: &[f64; RUN], now: &[f64; RUN], sign: f64) -> bool {
+    let (passed, now) = (S::as_simd_f64s(passed).0, S::as_simd_f64s(now).0);
+    let sign = simd.splat_f64s(sign);
+    let mut least = simd.splat_f64s(0.0);
+    for (passed, now) in passed.iter().zip(now) {
+        least = simd.min_f64s(least, simd.mul_f64s(sign, simd.sub_f64s(*now, *passed)));
+    }
+    simd.reduce_min_f64s(least) >= 0.0
+}
+
+/// `slope z + constant`.
+#[inline(always)]
+fn line<S: Simd>(simd: S, z: &[f64; RUN], slope: f64, constant: f64, out: &mut [f64; RUN]) {
+    let (slope, constant) = (simd.splat_f64s(slope), simd.splat_f64s(constant));
+    let (z, out) = (S::as_simd_f64s(z).0, S::as_mut_simd_f64s(out).0);
+    for (z, out) in z.iter().zip(out) {
+        *out = simd.mul_add_e_f64s(slope, *z, constant);
+    }
+}

@@ -1,0 +1,90 @@
+//! A sum of deadzones as one piecewise linear curve.
+
+use super::knots::Knots;
+use super::ranked::sums;
+use crate::operators::Reading;
+
+/// `a_c x + b_c`, c the number of knots at most x.
+struct Curve {
+    knots: Knots,
+    lines: Vec<(f64, f64)>,
+}
+
+impl Curve {
+    /// `sum_j g_j max(x - eta_j, 0)`, less `sum_j h_j max(eta_j - x, 0)`; terms are `(eta, g, h)`.
+    fn new(mut terms: Vec<(f64, f64, f64)>) -> Self {
+        terms.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let all = |part: fn(&(f64, f64, f64)) -> f64| sums(terms.iter().map(part));
+        // below: what the knots that x has passed add; above: what the others still take
+        let (below, below_moment) = (all(|t| t.1), all(|t| t.1 * t.0));
+        let rest = |part: fn(&(f64, f64, f64)) -> f64| {
+            let mut rest = sums(terms.iter().rev().map(part));
+            rest.reverse();
+            rest
+        };
+        let (above, above_moment) = (rest(|t| t.2), rest(|t| t.2 * t.0));
+        let line = |c: usize| (below[c] + above[c], -below_moment[c] - above_moment[c]);
+        Self {
+            lines: (0..=terms.len()).map(line).collect(),
+            knots: Knots::new(terms.iter().map(|term| term.0).collect()),
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, x: f64) -> f64 {
+        let (slope, constant) = self.lines[self.knots.at_most(x)];
+        slope * x + constant
+    }
+}
+
+/// Whether a signal is long enough for it to pay that the curve is worked out first.
+pub(crate) fn pays(zones: usize, samples: usize) -> bool {
+    const FEWEST: usize = 128;
+    zones > 1 && samples >= FEWEST.max(4 * zones)
+}
+
+/// Outputs of deadzones in place of their inputs; `previous` is the input before the first one and moves on.
+///
+/// The same as sample by sample up to rounding. `false`, and nothing done, where an input is not finite.
+pub(crate) fn in_place(
+    thresholds: &[f64],
+    weights: &[f64],
+    reading: Reading,
+    previous: &mut f64,
+    signal: &mut [f64],
+) -> bool {
+    if !signal.iter().all(|u| u.is_finite()) {
+        return false;
+    }
+    let last = signal.last().copied().unwrap_or(*previous);
+    let zones = thresholds.iter().zip(weights);
+    match reading {
+        Reading::OneSided => {
+            let term = |(&eta, &g): (&f64, &f64)| match eta {
+                _ if eta > 0.0 => (eta, g, 0.0),
+                _ if eta < 0.0 => (eta, 0.0, g),
+                _ => (eta, g, g),
+            };
+            let curve = Curve::new(zones.map(term).collect());
+            signal.iter_mut().for_each(|u| *u = curve.at(*u));
+        }
+        Reading::Directional => {
+            let rising = Curve::new(zones.map(|(&eta, &g)| (eta, g, 0.0)).collect());
+            let mut before = *previous;
+            for value in signal {
+                let u = *value;
+                // a falling u is a rising -u
+                *value = if u > before {
+                    rising.at(u)
+                } else if u < before {
+                    -rising.at(-u)
+                } else {
+                    0.0
+                };
+                before = u;
+            }
+        }
+    }
+    *previous = last;
+    true
+}

@@ -1,0 +1,251 @@
+"""Time the same work here, in NumPy, in numba, in SciPy, in python-control and in a C loop, side by side.
+
+Every round runs each of them once, one after the other, so that what the machine does beside it meets all of
+them; the table holds medians. `make bench-peers` writes docs/benchmarks.md.
+"""
+
+import argparse
+import ctypes
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import control
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+import gpi_hammerstein as gpi
+from gpi_hammerstein.files import write_atomically
+
+Array = NDArray[np.float64]
+Work = Callable[[], object]
+OURS = "gpi"
+PEERS = ("copy", "C loop", "numba", "NumPy", "python-control")
+
+HEADER = """# Benchmarks
+
+Made by `make bench-peers` on {machine}.
+
+Called from Python on NumPy arrays, on one thread here; the C loop is compiled with `-O3`. Columns from `copy`
+on are the peer's time over ours, medians of rounds in which each runs once: above 1 we are faster. `copy` is
+NumPy's copy of the input into new memory, the least that any of them does.
+
+"""
+
+C_LOOP = """
+void plays(const double *z, double *v, long samples, const double *r, const double *p, double *f, long n) {
+    for (long k = 0; k < samples; k++) {
+        double sum = 0.0;
+        for (long i = 0; i < n; i++) {
+            double low = z[k] - r[i], high = z[k] + r[i];
+            double place = f[i] < low ? low : f[i];
+            place = place > high ? high : place;
+            f[i] = place;
+            sum += p[i] * place;
+        }
+        v[k] = sum;
+    }
+}
+"""
+
+
+@numba.njit
+def numba_plays(z: Array, r: Array, p: Array) -> Array:
+    """Return the sum of weighted plays by two loops."""
+    v = np.empty_like(z)
+    places = np.zeros_like(r)
+    for k in range(len(z)):
+        total = 0.0
+        for i in range(len(r)):
+            place = max(z[k] - r[i], min(z[k] + r[i], places[i]))
+            places[i] = place
+            total += p[i] * place
+        v[k] = total
+    return v
+
+
+class Loop:
+    """The C loop, compiled for this machine's gcc."""
+
+    def __init__(self, folder: Path) -> None:
+        source, library = folder / "plays.c", folder / "plays.so"
+        source.write_text(C_LOOP)
+        compiler = os.environ.get("CC", "gcc")
+        subprocess.run([compiler, "-O3", "-shared", "-fPIC", "-o", library, source], check=True)
+        self.run = ctypes.CDLL(str(library)).plays
+        pointer = np.ctypeslib.ndpointer(np.float64, flags="C_CONTIGUOUS")
+        self.run.argtypes = [pointer, pointer, ctypes.c_long, pointer, pointer, pointer, ctypes.c_long]
+        self.run.restype = None
+
+    def __call__(self, z: Array, r: Array, p: Array) -> Array:
+        """Return the sum of weighted plays."""
+        v = np.empty_like(z)
+        self.run(z, v, len(z), r, p, np.zeros_like(r), len(r))
+        return v
+
+
+@dataclass(frozen=True)
+class Row:
+    """One piece of work and how long each took, in seconds."""
+
+    name: str
+    samples: int
+    seconds: dict[str, float]
+
+
+def timed(name: str, samples: int, works: dict[str, Work], rounds: int) -> Row:
+    """Return the median times of works that are run in turn."""
+    seconds: dict[str, list[float]] = {peer: [] for peer in works}
+    for work in works.values():
+        work()
+    for _ in range(rounds):
+        for peer, work in works.items():
+            start = time.perf_counter()
+            work()
+            seconds[peer].append(time.perf_counter() - start)
+    row = Row(name, samples, {peer: float(np.median(all_)) for peer, all_ in seconds.items()})
+    print(line(row), flush=True)
+    return row
+
+
+def bank(plays: int) -> tuple[Array, Array]:
+    """Return half-widths and weights."""
+    return np.arange(plays) / plays, 1.0 / (1.0 + np.arange(plays))
+
+
+def signals(samples: int) -> dict[str, Array]:
+    """Return a sine, a multisine and white noise."""
+    k = np.arange(samples)
+    noise = np.random.default_rng(1).uniform(-1.0, 1.0, samples)
+    tones = [np.sin(2 * np.pi * f * k + f * 1e5) for f in (1e-4, 2.3e-4, 7.1e-4, 1.7e-3)]
+    return {"sine": np.sin(2 * np.pi * 1e-3 * k), "multisine": sum(tones) / 3.0, "noise": noise}
+
+
+def plays(rounds: int, loop: Loop) -> list[Row]:
+    """Time banks of plays."""
+    rows = []
+    for samples, counts in ((10_000_000, (8, 32)), (1_000_000, (8, 32, 128, 1024))):
+        for name, z in signals(samples).items():
+            for count in counts:
+                r, p = bank(count)
+                ours = gpi.PlayBank(r, p)
+                if not np.allclose(ours(z), loop(z, r, p), rtol=0, atol=1e-13 * p.sum()):
+                    raise SystemExit(f"plays, {name}, n = {count}: the results differ")
+                works: dict[str, Work] = {
+                    OURS: lambda ours=ours, z=z: ours(z),
+                    "copy": lambda z=z: z.copy(),
+                    "C loop": lambda z=z, r=r, p=p: loop(z, r, p),
+                    "numba": lambda z=z, r=r, p=p: numba_plays(z, r, p),
+                }
+                few = 3 if count >= 1024 else rounds
+                rows.append(timed(f"{count} plays, {name}, {samples:.0e} samples", samples, works, few))
+    return rows
+
+
+def deadzones(rounds: int) -> list[Row]:
+    """Time envelopes of deadzones."""
+    rows = []
+    u = signals(1_000_000)["noise"]
+    for count in (17, 128):
+        eta, g = np.linspace(-0.9, 0.9, count), np.full(count, 0.1)
+        ours = gpi.Deadzones(eta, g)
+
+        def by_numpy(eta: Array = eta, g: Array = g) -> Array:
+            z = np.zeros_like(u)
+            for threshold, weight in zip(eta, g, strict=True):
+                beyond = u - threshold
+                side = np.maximum if threshold > 0 else np.minimum
+                z += weight * (side(beyond, 0.0) if threshold else beyond)
+            return z
+
+        works: dict[str, Work] = {OURS: lambda ours=ours: ours(u), "copy": u.copy, "NumPy": by_numpy}
+        rows.append(timed(f"{count} deadzones, noise, 1e+06 samples", len(u), works, rounds))
+    return rows
+
+
+def fir(rounds: int) -> list[Row]:
+    """Time finite impulse responses by least squares."""
+    rows = []
+    samples = 100_000
+    u = signals(samples)["noise"]
+    for taps in (31, 301):
+        y = np.convolve(u, np.exp(-np.arange(taps) / 9.0))[:samples]
+
+        def by_numpy(taps: int = taps, y: Array = y) -> object:
+            rows = np.lib.stride_tricks.sliding_window_view(u, taps)[:, ::-1]
+            regressor = np.column_stack([rows, np.ones(len(rows))])
+            return np.linalg.lstsq(regressor, y[taps - 1 :], rcond=None)
+
+        works: dict[str, Work] = {OURS: lambda taps=taps, y=y: gpi.fir(u, y, taps), "NumPy": by_numpy}
+        rows.append(timed(f"FIR, {taps} taps, {samples:.0e} samples", samples, works, 3))
+    return rows
+
+
+def era(rounds: int) -> list[Row]:
+    """Time realizations from Markov parameters."""
+    rows = []
+    for size in (15, 50, 150, 300):
+        k = np.arange(2 * size + 1)
+        markov = 0.95**k * np.cos(0.3 * k) + 0.5 * 0.8**k + 0.1 * (-0.5) ** k
+        markov[0] = 0.0
+        hankel = markov[1 + np.arange(size)[:, None] + np.arange(size)[None, :]]
+        works: dict[str, Work] = {
+            OURS: lambda markov=markov: gpi.era(markov, order=4),
+            "NumPy": lambda hankel=hankel: np.linalg.svd(hankel),
+            "python-control": lambda markov=markov, size=size: control.eigensys_realization(
+                markov[None, None, :], 4, m=size, n=size
+            ),
+        }
+        rows.append(timed(f"ERA, Hankel {size} x {size}, order 4", size, works, rounds))
+    return rows
+
+
+def line(row: Row) -> str:
+    """Return a row of the table."""
+    ours = row.seconds[OURS]
+    cells = [f"{row.seconds[p] / ours:.3g}" if p in row.seconds else "" for p in PEERS]
+    return f"| {row.name} | {1e3 * ours:.3g} | {' | '.join(cells)} |"
+
+
+def machine() -> str:
+    """Say what this ran on."""
+    names = [row for row in Path("/proc/cpuinfo").read_text().splitlines() if row.startswith("model name")]
+    compiler = shutil.which(os.environ.get("CC", "gcc")) or "gcc"
+    built = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True).stdout
+    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "control"))
+    return (
+        f"{len(names)} x {names[0].split(':')[1].strip()}; {built.splitlines()[0]}; "
+        f"Python {platform.python_version()}, {packages}, gpi-hammerstein {version('gpi-hammerstein')}"
+    )
+
+
+def main() -> None:
+    """Print the table, and write it where asked."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--markdown", type=Path, help="write the table here")
+    parser.add_argument("--rounds", type=int, default=7, help="rounds that the medians are of")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        loop = Loop(Path(folder))
+        rounds = options.rounds
+        rows = [*plays(rounds, loop), *deadzones(rounds), *fir(rounds), *era(rounds)]
+    if options.markdown:
+        peers = " | ".join(PEERS)
+        head = [f"| work | here, ms | {peers} |", "|---" * (2 + len(PEERS)) + "|"]
+        text = HEADER.format(machine=machine()) + "\n".join([*head, *map(line, rows)]) + "\n"
+        write_atomically(options.markdown, text)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
