@@ -35,9 +35,11 @@ HEADER = """# Benchmarks
 
 Made by `make bench-peers` on {machine}.
 
-Called from Python on NumPy arrays, on one thread here; the C loop is compiled with `-O3`. Columns from `copy`
-on are the peer's time over ours, medians of rounds in which each runs once: above 1 we are faster. `copy` is
-NumPy's copy of the input into new memory, the least that any of them does.
+Called from Python on NumPy arrays, on one thread where no other number is named; the C loop is compiled
+with `-O3`. Columns from `copy` on are the peer's time over ours, medians of rounds in which each runs once:
+above 1 we are faster. `copy` is NumPy's copy of the input into new memory, the least that any of them does.
+NumPy's part of `FIR` is `lstsq`, of `ERA` the singular value decomposition alone, of which `order 6` needs
+the leading values and the other all.
 
 """
 
@@ -148,6 +150,10 @@ def plays(rounds: int, loop: Loop) -> list[Row]:
                 }
                 few = 3 if count >= 1024 else rounds
                 rows.append(timed(f"{count} plays, {name}, {samples:.0e} samples", samples, works, few))
+                if samples == 10_000_000 and name == "noise":
+                    works[OURS] = lambda ours=ours, z=z: ours(z, threads=2)
+                    label = f"{count} plays, {name}, {samples:.0e} samples, two threads here"
+                    rows.append(timed(label, samples, works, rounds))
     return rows
 
 
@@ -175,37 +181,49 @@ def deadzones(rounds: int) -> list[Row]:
 def fir(rounds: int) -> list[Row]:
     """Time finite impulse responses by least squares."""
     rows = []
-    samples = 100_000
-    u = signals(samples)["noise"]
-    for taps in (31, 301):
-        y = np.convolve(u, np.exp(-np.arange(taps) / 9.0))[:samples]
+    for samples, counts in ((100_000, (31, 301)), (1_000_000, (31, 301))):
+        u = signals(samples)["noise"]
+        for taps in counts:
+            truth = np.exp(-np.arange(taps) / 9.0)
+            y = np.convolve(u, truth)[:samples]
 
-        def by_numpy(taps: int = taps, y: Array = y) -> object:
-            rows = np.lib.stride_tricks.sliding_window_view(u, taps)[:, ::-1]
-            regressor = np.column_stack([rows, np.ones(len(rows))])
-            return np.linalg.lstsq(regressor, y[taps - 1 :], rcond=None)
+            def by_numpy(taps: int = taps, y: Array = y, u: Array = u) -> Array:
+                rows = np.lib.stride_tricks.sliding_window_view(u, taps)[:, ::-1]
+                regressor = np.column_stack([rows, np.ones(len(rows))])
+                found: Array = np.linalg.lstsq(regressor, y[taps - 1 :], rcond=None)[0]
+                return found
 
-        works: dict[str, Work] = {OURS: lambda taps=taps, y=y: gpi.fir(u, y, taps), "NumPy": by_numpy}
-        rows.append(timed(f"FIR, {taps} taps, {samples:.0e} samples", samples, works, 3))
+            ours = np.max(np.abs(gpi.fir(u, y, taps).markov[0, 0] - truth))
+            theirs = np.max(np.abs(by_numpy()[:taps] - truth))
+            print(f"largest error of {taps} taps: {ours:.1e} here, {theirs:.1e} by lstsq")
+            works: dict[str, Work] = {
+                OURS: lambda taps=taps, y=y, u=u: gpi.fir(u, y, taps),
+                "NumPy": by_numpy,
+            }
+            few = 1 if samples * taps > 100_000_000 else 3
+            rows.append(timed(f"FIR, {taps} taps, {samples:.0e} samples", samples, works, few))
     return rows
 
 
 def era(rounds: int) -> list[Row]:
     """Time realizations from Markov parameters."""
     rows = []
-    for size in (15, 50, 150, 300):
+    noise = 1e-4 * np.random.default_rng(2).normal(size=1001)
+    for size in (15, 50, 150, 300, 500):
         k = np.arange(2 * size + 1)
-        markov = 0.95**k * np.cos(0.3 * k) + 0.5 * 0.8**k + 0.1 * (-0.5) ** k
+        modes = ((0.95, 0.3), (0.9, 1.1), (0.8, 2.0))
+        markov = sum(radius**k * np.cos(angle * k) for radius, angle in modes) + noise[: len(k)]
         markov[0] = 0.0
         hankel = markov[1 + np.arange(size)[:, None] + np.arange(size)[None, :]]
-        works: dict[str, Work] = {
-            OURS: lambda markov=markov: gpi.era(markov, order=4),
-            "NumPy": lambda hankel=hankel: np.linalg.svd(hankel),
-            "python-control": lambda markov=markov, size=size: control.eigensys_realization(
-                markov[None, None, :], 4, m=size, n=size
-            ),
-        }
-        rows.append(timed(f"ERA, Hankel {size} x {size}, order 4", size, works, rounds))
+        for order in (6, 13):
+            works: dict[str, Work] = {
+                OURS: lambda markov=markov, order=order, size=size: gpi.era(markov, order, size),
+                "NumPy": lambda hankel=hankel: np.linalg.svd(hankel),
+                "python-control": lambda markov=markov, size=size, order=order: control.eigensys_realization(
+                    markov[None, None, :], order, m=size, n=size
+                ),
+            }
+            rows.append(timed(f"ERA, Hankel {size} x {size}, order {order}", size, works, rounds))
     return rows
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.linalg
 
-EXCITATION_TOLERANCE = 1e-6
+EXCITATION_TOLERANCE = 1e-13
 
 StateMatrices = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 

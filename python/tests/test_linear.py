@@ -330,6 +330,18 @@ def test_era_keeps_a_pure_delay():
     assert found.spectral_radius < 1e-4  # a defective pole at 0: the cube root of the rounding
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-2])
+def test_era_of_a_large_hankel_matrix_takes_its_leading_singular_values(noise):
+    """A given order needs no more than those, if they stand out of noise; all are as of the whole matrix."""
+    markov = oracle.markov(*TWO_BY_TWO, 321)
+    markov = markov + noise * np.random.default_rng(23).normal(size=markov.shape)
+    found = gpi.era(markov, order=3)
+    (a, b, c, d), s = oracle.era(markov, 3)
+    assert len(found.singular_values) == (3 if noise < 1e-3 else len(s))
+    assert_agree(found.singular_values[:3], s[:3], 1e-12)
+    assert_agree(found.markov(12), oracle.markov(a, b, c, d, 12), 1e-9)
+
+
 def test_era_reflects_unstable_poles_and_says_so():
     growing = oracle.from_transfer_function([1.0, 0.2], [1.0, -1.2, 1.21])  # modulus 1.1
     found = gpi.era(oracle.markov(*growing, 21))

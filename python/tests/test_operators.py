@@ -118,6 +118,36 @@ def test_long_records_agree_with_the_oracle():
                 check_gpi(z, thresholds, slopes, [0.0, 0.3, 2.0], [1.0, -0.5, 2.0], reading)
 
 
+def test_channels_have_states_of_their_own():
+    rng = np.random.default_rng(8)
+    z = np.cumsum(rng.normal(size=(3000, 3)), axis=0)
+    bank, start = gpi.PlayBank([0.0, 0.5, 2.0], [1.0, 0.5, 2.0]), rng.normal(size=(3, 3))
+    v, state = bank.run(z, start)
+    cascade = gpi.Gpi(gpi.Deadzones([-1.0, 0.0, 1.0], [0.1, 1.0, 0.2]), bank)
+    together = cascade(z)
+    for channel in range(3):
+        alone, after = bank.run(z[:, channel], start[:, channel])
+        np.testing.assert_array_equal(v[:, channel], alone)
+        np.testing.assert_array_equal(state[:, channel], after)
+        np.testing.assert_array_equal(together[:, channel], cascade(z[:, channel]))
+    with pytest.raises(gpi.ParameterError, match="2 channels.*3"):
+        bank.run(z, start[:, :2])
+
+
+@pytest.mark.parametrize("threads", [2, 3, 7])
+def test_threads_change_nothing(threads):
+    rng = np.random.default_rng(9)
+    bank = gpi.PlayBank([0.0, 0.3, 1.5], [1.0, 0.5, 2.0])
+    for z in (np.sin(0.01 * np.arange(20_000)), rng.normal(size=20_000), 1e-3 * rng.normal(size=20_000)):
+        start = np.array([0.1, 0.2, -1.0])
+        v, state = bank.run(z, start)
+        found, after = bank.run(z, start, threads=threads)
+        np.testing.assert_allclose(found, v, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(after, state, rtol=0, atol=1e-13)
+    with pytest.raises(gpi.ParameterError, match="threads"):
+        bank(z, threads=0)
+
+
 def test_lists_integers_strides_and_single_precision_are_read():
     bank = gpi.PlayBank([0, 1], [1, 2])
     expected, _ = oracle.play_bank([1, 3, 2, 0], [0, 1], [1, 2])
@@ -357,7 +387,7 @@ def test_published_tanh_envelope():
         (lambda: gpi.PlayBank([0.0, 1.0, 2.0], [1.0, 1.0, np.inf]), ["weights", "[2]", "finite"]),
         (lambda: gpi.PlayBank([0.0], [1.0]).run([1.0], [0.0, 0.0]), ["state", "2", "1"]),
         (lambda: gpi.PlayBank([0.0], [1.0]).run([1.0], [np.nan]), ["state", "[0]", "finite"]),
-        (lambda: gpi.PlayBank([0.0], [1.0])(np.zeros((3, 2))), ["`z`", "[3, 2]", "vector"]),
+        (lambda: gpi.PlayBank([0.0], [1.0])(np.zeros((3, 2, 1))), ["`z`", "[3, 2, 1]", "channels"]),
         (lambda: gpi.PlayBank(["wide"], [1.0]), ["half_widths", "numbers"]),
         (lambda: gpi.Deadzones([0.0, 1.0, 2.0], [1.0]), ["weights", "1", "3"]),
         (lambda: gpi.Deadzones([0.0, np.inf], [1.0, 1.0]), ["thresholds", "[1]", "finite"]),

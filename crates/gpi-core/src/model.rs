@@ -299,11 +299,9 @@ impl Model {
         let model: Self = serde_json::from_value(value).map_err(reason)?;
         // Built once more through the constructors, which refuse what does not fit together.
         for hysteresis in &model.hysteresis {
-            let (envelope, plays) = (hysteresis.envelope(), hysteresis.plays());
-            let (g, p) = (envelope.weights().to_vec(), plays.weights().to_vec());
-            let thresholds = envelope.thresholds().to_vec();
-            crate::operators::Deadzones::new(thresholds, g, envelope.reading())?;
-            crate::operators::PlayBank::new(plays.half_widths().to_vec(), p)?;
+            let plays = hysteresis.plays();
+            let (r, p) = (plays.half_widths().to_vec(), plays.weights().to_vec());
+            crate::operators::PlayBank::new(r, p)?;
         }
         let g = &model.linear;
         StateSpace::new(g.a().clone(), g.b().clone(), g.c().clone(), g.d().clone())?;

@@ -64,13 +64,18 @@ fn check(bank: &PlayBank<Vec<f64>>, start: Vec<f64>, input: &[f64], cut: usize) 
     let mut found = input.to_vec();
     let (first, second) = found.split_at_mut(cut.min(input.len()));
     bank.in_place(&mut fast, first);
-    bank.in_place(&mut fast, second);
+    bank.block(&mut fast, &input[first.len()..], second);
     let finite = input.iter().chain(&start).filter(|z| z.is_finite());
     let size = finite.fold(1e-300_f64, |size, z| size.max(z.abs()));
     let widest = bank.half_widths().iter().copied().fold(size, f64::max);
     let sum = bank.weights().iter().map(|p| p.abs()).sum::<f64>();
     assert!(apart(&found, &expected, widest * sum) < EXACT, "outputs");
     assert!(apart(fast.plays(), slow.plays(), widest) < EXACT, "states");
+    let mut shared = bank.state_from(start).unwrap();
+    let mut found = vec![0.0; input.len()];
+    bank.block_on(3, &mut shared, input, &mut found);
+    assert!(apart(&found, &expected, widest * sum) < EXACT, "outputs of three threads");
+    assert!(apart(shared.plays(), slow.plays(), widest) < EXACT, "states of three threads");
 }
 
 proptest! {

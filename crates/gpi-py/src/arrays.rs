@@ -51,12 +51,37 @@ pub(crate) fn matrix(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Matrix> {
 
 /// A signal: (samples,) or (samples, channels), and whether it had one dimension.
 pub(crate) fn signal(name: &str, value: &Bound<'_, PyAny>) -> PyResult<(Matrix, bool)> {
-    with_array(name, value, |array| match *array.shape() {
-        [samples] => Ok((Matrix::from_iterator(samples, 1, array.iter().copied()), true)),
+    with_array(name, value, |array| copied(name, &array))
+}
+
+fn copied(name: &str, array: &ArrayViewD<'_, f64>) -> PyResult<(Matrix, bool)> {
+    match *array.shape() {
+        [] => Ok((Matrix::from_element(1, 1, array[[]]), true)),
+        [samples] => {
+            let values =
+                array.as_slice().map_or_else(|| array.iter().copied().collect(), <[_]>::to_vec);
+            Ok((Matrix::from_vec(samples, 1, values), true))
+        }
         [samples, channels] => {
             Ok((Matrix::from_fn(samples, channels, |k, i| array[[k, i]]), false))
         }
         _ => dimensions(name, array.shape(), "(samples,) or (samples, channels)"),
+    }
+}
+
+/// Runs `read` on a signal's channels one after the other, its (samples, channels), and whether it had one dimension;
+/// a signal of one dimension is not copied.
+pub(crate) fn with_columns<T>(
+    name: &str,
+    value: &Bound<'_, PyAny>,
+    read: impl FnOnce(&[f64], (usize, usize), bool) -> PyResult<T>,
+) -> PyResult<T> {
+    with_array(name, value, |array| {
+        if let (1, Some(values)) = (array.ndim(), array.as_slice()) {
+            return read(values, (values.len(), 1), true);
+        }
+        let (values, one_dimensional) = copied(name, &array)?;
+        read(values.as_slice(), values.shape(), one_dimensional)
     })
 }
 
@@ -105,15 +130,15 @@ pub(crate) fn from_matrix<'py>(py: Python<'py>, matrix: &Matrix) -> Bound<'py, P
 }
 
 /// A signal in the form that the call's input had.
-pub(crate) fn from_signal<'py>(
-    py: Python<'py>,
-    matrix: &Matrix,
+pub(crate) fn from_signal(
+    py: Python<'_>,
+    matrix: Matrix,
     one_dimensional: bool,
-) -> Bound<'py, PyAny> {
+) -> Bound<'_, PyAny> {
     if one_dimensional && matrix.ncols() == 1 {
-        from_vector(py, matrix.as_slice())
+        from_owned(py, matrix.data.into())
     } else {
-        from_matrix(py, matrix)
+        from_matrix(py, &matrix)
     }
 }
 

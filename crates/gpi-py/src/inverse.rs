@@ -62,7 +62,7 @@ impl IntermediateSignal {
     /// v-hat, shaped like the output it was computed from.
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        from_signal(py, &self.signal.values, self.one_dimensional)
+        from_signal(py, self.signal.values.clone(), self.one_dimensional)
     }
 
     /// The samples whose inverse saw measured outputs only.

@@ -182,14 +182,14 @@ impl Model {
             None => self.model.simulate(&input),
             Some(columns) => self.model.simulate_beside(&input, &signal("covariates", columns)?.0),
         };
-        Ok(from_signal(u.py(), &output.map_err(to_python)?, one_dimensional))
+        Ok(from_signal(u.py(), output.map_err(to_python)?, one_dimensional))
     }
 
     /// The intermediate signal v that belongs to ``simulate``, shaped like u.
     fn intermediate<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (input, one_dimensional) = signal("u", u)?;
         let v = self.model.intermediate(&input).map_err(to_python)?;
-        Ok(from_signal(u.py(), &v, one_dimensional))
+        Ok(from_signal(u.py(), v, one_dimensional))
     }
 
     /// The state of an actuator that was raised from zero to u, shape (inputs,), and stands there.
@@ -220,7 +220,7 @@ impl Model {
         let mut state = self.read(&vector("state", state)?)?;
         let output = self.model.simulate_from(&mut state, &input).map_err(to_python)?;
         let py = u.py();
-        Ok((from_signal(py, &output, one_dimensional), from_vector(py, &Self::write(&state))))
+        Ok((from_signal(py, output, one_dimensional), from_vector(py, &Self::write(&state))))
     }
 
     /// The simulation error over the scored samples of a record.

@@ -1,9 +1,9 @@
 //! Deadzones, plays and their cascade.
 
-use crate::arrays::{from_owned, from_vector, vector};
+use crate::arrays::{self, from_owned, from_signal, from_vector, vector, with_columns};
 use crate::errors::{parameter, to_python};
-use gpi_core::Hysteresis;
 use gpi_core::operators::{self, DeadzonesState, GpiState, Operator, Reading};
+use gpi_core::{Hysteresis, Matrix};
 use pyo3::prelude::*;
 
 type Bank = operators::PlayBank<Vec<f64>>;
@@ -56,42 +56,90 @@ impl PlayBank {
         from_vector(py, self.bank.weights())
     }
 
-    /// The output of a signal z, shape (samples,), from rest.
-    fn __call__<'py>(&self, z: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        Ok(self.run(z, None)?.0)
+    /// The output of a signal z, shape (samples,) or (samples, channels), from rest.
+    ///
+    /// ``threads`` > 1 cuts the time of each channel into so many stretches that run at once; it pays from about a
+    /// million samples on.
+    #[pyo3(signature = (z, *, threads = 1))]
+    fn __call__<'py>(&self, z: &Bound<'py, PyAny>, threads: usize) -> PyResult<Bound<'py, PyAny>> {
+        Ok(self.run(z, None, threads)?.0)
     }
 
     /// The output from a given state, and the state after the last sample.
     ///
     /// Parameters
     /// ----------
-    /// z : array_like, shape (samples,)
-    ///     Input.
-    /// state : array_like, shape (n,), optional
+    /// z : array_like, shape (samples,) or (samples, channels)
+    ///     Input; each channel has plays of its own.
+    /// state : array_like, shape (n,) or (n, channels), optional
     ///     Play outputs F_i(-1) in the input's unit; zeros (rest) when left out.
+    /// threads : int
+    ///     Stretches of time that run at once.
     ///
     /// Returns
     /// -------
     /// tuple of ndarray
-    ///     v, shape (samples,), and the state, shape (n,).
-    #[pyo3(signature = (z, state = None))]
+    ///     v in the shape of z, and the state, shape (n,) or (n, channels).
+    #[pyo3(signature = (z, state = None, *, threads = 1))]
     fn run<'py>(
         &self,
         z: &Bound<'py, PyAny>,
         state: Option<&Bound<'py, PyAny>>,
+        threads: usize,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let mut state = match state {
-            Some(plays) => self.bank.state_from(vector("state", plays)?).map_err(to_python)?,
-            None => self.bank.rest(),
-        };
-        let mut signal = vector("z", z)?;
-        z.py().detach(|| self.bank.in_place(&mut state, &mut signal));
-        Ok((from_owned(z.py(), signal), from_vector(z.py(), state.plays())))
+        if threads == 0 {
+            return Err(parameter("`threads` = 0: at least one is needed".to_owned()));
+        }
+        let bank = &self.bank;
+        let read = |plays: &[f64]| bank.state_from(plays.to_vec()).map_err(to_python);
+        channels(z, ("z", self.bank.weights().len()), state, read, |state, input, output| {
+            if threads == 1 {
+                bank.block(state, input, output);
+            } else {
+                bank.block_on(threads, state, input, output);
+            }
+            state.plays().to_vec()
+        })
     }
 
     fn __repr__(&self) -> String {
         format!("PlayBank({} plays, weights sum to {})", self.bank.weights().len(), sum(&self.bank))
     }
+}
+
+/// Runs each channel of a signal from its own state, all from zeros where none is given; `run` returns the state after
+/// the last sample. States hold so many numbers.
+fn channels<'py, S: Send + Sync>(
+    signal: &Bound<'py, PyAny>,
+    (name, length): (&str, usize),
+    state: Option<&Bound<'py, PyAny>>,
+    read: impl Fn(&[f64]) -> PyResult<S>,
+    run: impl Fn(&mut S, &[f64], &mut [f64]) -> Vec<f64> + Sync,
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    let py = signal.py();
+    with_columns(name, signal, |input, (samples, count), one_dimensional| {
+        let begin = match state {
+            Some(state) => arrays::signal("state", state)?.0,
+            None => Matrix::zeros(length, count),
+        };
+        if begin.ncols() != count {
+            let states = begin.ncols();
+            let message = format!("`state` has {states} channels, but `{name}` has {count}");
+            return Err(parameter(message));
+        }
+        let states: PyResult<Vec<S>> = begin.column_iter().map(|c| read(c.as_slice())).collect();
+        let (mut states, mut output) = (states?, vec![0.0; samples * count]);
+        let after: Vec<f64> = py.detach(|| {
+            let columns = states.iter_mut().enumerate().map(|(channel, state)| {
+                let own = channel * samples..(channel + 1) * samples;
+                run(state, &input[own.clone()], &mut output[own])
+            });
+            columns.flatten().collect()
+        });
+        let values = Matrix::from_vec(samples, count, output);
+        let after = Matrix::from_vec(length, count, after);
+        Ok((from_signal(py, values, one_dimensional), from_signal(py, after, one_dimensional)))
+    })
 }
 
 fn sum(bank: &Bank) -> f64 {
@@ -248,7 +296,7 @@ impl Gpi {
         PlayBank { bank: self.hysteresis.plays().clone() }
     }
 
-    /// The output of a signal u, shape (samples,), from rest.
+    /// The output of a signal u, shape (samples,) or (samples, channels), from rest.
     fn __call__<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         Ok(self.run(u, None)?.0)
     }
@@ -257,28 +305,28 @@ impl Gpi {
     ///
     /// Parameters
     /// ----------
-    /// u : array_like, shape (samples,)
-    ///     Input.
-    /// state : array_like, shape (1 + n,), optional
+    /// u : array_like, shape (samples,) or (samples, channels)
+    ///     Input; each channel has a state of its own.
+    /// state : array_like, shape (1 + n,) or (1 + n, channels), optional
     ///     The previous input, then the play outputs; zeros (rest) when left out.
     ///
     /// Returns
     /// -------
     /// tuple of ndarray
-    ///     v, shape (samples,), and the state, shape (1 + n,).
+    ///     v in the shape of u, and the state, shape (1 + n,) or (1 + n, channels).
     #[pyo3(signature = (u, state = None))]
     fn run<'py>(
         &self,
         u: &Bound<'py, PyAny>,
         state: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let mut state = match state {
-            Some(values) => read_state(&self.hysteresis, &vector("state", values)?)?,
-            None => self.hysteresis.rest(),
-        };
-        let mut signal = vector("u", u)?;
-        u.py().detach(|| self.hysteresis.in_place(&mut state, &mut signal));
-        Ok((from_owned(u.py(), signal), from_vector(u.py(), &write_state(&state))))
+        let hysteresis = &self.hysteresis;
+        let length = 1 + hysteresis.plays().weights().len();
+        let read = |values: &[f64]| read_state(hysteresis, values);
+        channels(u, ("u", length), state, read, |state, input, output| {
+            hysteresis.block(state, input, output);
+            write_state(state)
+        })
     }
 
     fn __repr__(&self) -> String {

@@ -149,7 +149,7 @@ impl Refinement {
     fn loop_std<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (input, one_dimensional) = signal("u", u)?;
         let found = self.refinement.loop_deviations(&input).map_err(to_python)?;
-        Ok(from_signal(u.py(), &found, one_dimensional))
+        Ok(from_signal(u.py(), found, one_dimensional))
     }
 
     fn __repr__(&self) -> String {

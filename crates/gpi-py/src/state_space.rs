@@ -258,7 +258,7 @@ impl StateSpace {
         };
         let output = self.system.simulate_from(&mut state, &input).map_err(to_python)?;
         let py = u.py();
-        Ok((from_signal(py, &output, one_dimensional), from_vector(py, state.as_slice())))
+        Ok((from_signal(py, output, one_dimensional), from_vector(py, state.as_slice())))
     }
 
     /// The first `count` Markov parameters, shape (outputs, inputs, count).

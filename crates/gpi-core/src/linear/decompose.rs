@@ -2,7 +2,7 @@
 
 use crate::{Error, Matrix};
 use faer::linalg::solvers::Solve;
-use faer::{MatRef, Side};
+use faer::{Mat, MatRef, Scale, Side};
 use nalgebra::DVector;
 use num_complex::Complex64;
 
@@ -26,12 +26,72 @@ fn not_converged(decomposition: &'static str, matrix: &Matrix) -> Error {
 }
 
 /// The thin singular value decomposition.
+///
+/// That of a symmetric matrix is its eigendecomposition up to signs, which takes less.
 pub(crate) fn svd(matrix: &Matrix) -> Result<Svd, Error> {
+    if is_symmetric(matrix) {
+        let (values, vectors) = symmetric_eigen(matrix)?;
+        let mut order: Vec<usize> = (0..values.len()).collect();
+        order.sort_by(|&i, &j| values[j].abs().total_cmp(&values[i].abs()));
+        let s = order.iter().map(|&i| values[i].abs()).collect();
+        let v = vectors.select_columns(&order);
+        let mut u = v.clone();
+        for (mut column, &i) in u.column_iter_mut().zip(&order) {
+            column *= values[i].signum();
+        }
+        return Ok(Svd { u, s, v });
+    }
     let svd = view(matrix)
         .thin_svd()
         .map_err(|_| not_converged("singular value decomposition", matrix))?;
     let s = svd.S().column_vector().iter().copied().collect();
     Ok(Svd { u: owned(svd.U()), s, v: owned(svd.V()) })
+}
+
+/// The singular values, descending.
+pub(crate) fn singular_values(matrix: &Matrix) -> Result<Vec<f64>, Error> {
+    view(matrix)
+        .singular_values()
+        .map_err(|_| not_converged("singular value decomposition", matrix))
+}
+
+/// The `count` largest singular values with their vectors by passes of a block of directions through the matrix
+/// (Halko, Martinsson and Tropp 2011); `None` where some passes do not bring them to rounding.
+pub(crate) fn leading_svd(matrix: &Matrix, count: usize) -> Option<Svd> {
+    /// Directions besides those that are wanted: what they take up disturbs these no more.
+    const SPARE: usize = 6;
+    const PASSES: i32 = 6;
+    /// Of the largest singular value.
+    const TOLERANCE: f64 = 1e-14;
+    let (a, width) = (view(matrix), (count + SPARE).min(matrix.nrows().min(matrix.ncols())));
+    // any directions that no singular vector is at right angles to
+    let mut image = a * Mat::from_fn(matrix.ncols(), width, |i, j| {
+        ((i * i + 1) as f64 * (j + 1) as f64 * 0.618).sin()
+    });
+    let mut before = f64::INFINITY;
+    for passes in (0..PASSES).rev() {
+        let left = image.qr().compute_thin_Q();
+        let parts = (a.transpose() * &left).thin_svd().ok()?;
+        let (s, right) = (parts.S().column_vector(), parts.U());
+        let left = left * parts.V();
+        image = a * right;
+        // the transposed matrix turns each left vector into s times the right one by construction
+        let error = |j: usize| (image.col(j) - left.col(j) * Scale(s[j])).norm_l2() / s[0];
+        let error = (0..count).map(error).fold(0.0, f64::max);
+        if error <= TOLERANCE {
+            return Some(Svd {
+                u: owned(left.as_ref().subcols(0, count)),
+                s: s.iter().copied().take(count).collect(),
+                v: owned(right.subcols(0, count)),
+            });
+        }
+        // each pass lowers it as much as the one before did
+        if error * (error / before).powi(passes) > TOLERANCE && before.is_finite() {
+            break;
+        }
+        before = error;
+    }
+    None
 }
 
 /// The full singular value decomposition: u and v are square.
@@ -45,6 +105,11 @@ pub(crate) fn full_svd(matrix: &Matrix) -> Result<Svd, Error> {
         view(matrix).svd().map_err(|_| not_converged("singular value decomposition", matrix))?;
     let s = svd.S().column_vector().iter().copied().collect();
     Ok(Svd { u: owned(svd.U()), s, v: owned(svd.V()) })
+}
+
+fn is_symmetric(matrix: &Matrix) -> bool {
+    let n = matrix.nrows();
+    matrix.is_square() && (0..n).all(|j| (0..j).all(|i| matrix[(i, j)] == matrix[(j, i)]))
 }
 
 /// Eigenvalues (descending) and eigenvectors of a symmetric matrix; its lower triangle is read.

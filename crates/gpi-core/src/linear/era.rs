@@ -1,7 +1,7 @@
 //! The eigensystem realization algorithm: from Markov parameters to a state space.
 
 use super::StateSpace;
-use super::decompose::{Svd, eigen, svd};
+use super::decompose::{Svd, eigen, leading_svd, svd};
 use crate::{Error, Matrix};
 use num_complex::Complex64;
 
@@ -20,7 +20,8 @@ pub struct EraOptions {
 pub struct Era {
     /// The realized model, balanced: both Gramians of the finite Hankel matrix are diag(s).
     pub system: StateSpace,
-    /// All singular values of the block Hankel matrix, descending.
+    /// Singular values of the block Hankel matrix, descending: all, or as many as the order where this was given and
+    /// the matrix is so large that no others were worked out.
     pub singular_values: Vec<f64>,
     /// Unstable poles that were reflected into the unit circle. They come from noise in the taps; a
     /// mode that matters would have made the taps grow.
@@ -49,7 +50,7 @@ pub struct Era {
 /// Too few taps for the order or the blocks, taps of unequal size or not finite, a realization that
 /// cannot be made stable.
 pub fn realize(markov: &[Matrix], options: &EraOptions) -> Result<Era, Error> {
-    let hankel = Hankel::new(markov, options.blocks)?;
+    let hankel = Hankel::of_order(markov, options.blocks, options.order)?;
     hankel.realize(options.order.unwrap_or_else(|| hankel.suggested_order()))
 }
 
@@ -64,7 +65,20 @@ impl Hankel {
     /// Largest dimension of a Hankel matrix whose size is not given.
     const LARGEST: usize = 300;
 
+    /// From this size on the leading singular values are faster found than all, if they are few.
+    const LARGE: usize = 100;
+    const FEW: usize = 12;
+
+    /// Decomposed whole, for any order.
     pub(crate) fn new(markov: &[Matrix], blocks: Option<usize>) -> Result<Self, Error> {
+        Self::of_order(markov, blocks, None)
+    }
+
+    fn of_order(
+        markov: &[Matrix],
+        blocks: Option<usize>,
+        order: Option<usize>,
+    ) -> Result<Self, Error> {
         let taps = markov.len();
         if taps < 3 {
             let purpose = "Markov parameters for a Hankel matrix".to_owned();
@@ -89,12 +103,24 @@ impl Hankel {
                 return Err(Error::parameter("markov", value, "every element must be finite"));
             }
         }
+        // all taps one below the other: each block column of the Hankel matrix is a part of it
+        let mut stacked = Matrix::zeros(taps * outputs, inputs);
+        for (lag, tap) in markov.iter().enumerate() {
+            stacked.rows_mut(lag * outputs, outputs).copy_from(tap);
+        }
         let hankel = |shift: usize| {
-            Matrix::from_fn(blocks * outputs, blocks * inputs, |row, column| {
-                markov[shift + row / outputs + column / inputs][(row % outputs, column % inputs)]
-            })
+            let mut matrix = Matrix::zeros(blocks * outputs, blocks * inputs);
+            for block in 0..blocks {
+                let part = stacked.rows((shift + block) * outputs, blocks * outputs);
+                matrix.columns_mut(block * inputs, inputs).copy_from(&part);
+            }
+            matrix
         };
-        let decomposition = svd(&hankel(1))?;
+        let first = hankel(1);
+        let is_large = blocks * outputs.min(inputs) >= Self::LARGE;
+        let few = order.filter(|&order| is_large && (1..=Self::FEW).contains(&order));
+        let leading = few.and_then(|order| leading_svd(&first, order));
+        let decomposition = leading.map_or_else(|| svd(&first), Ok)?;
         Ok(Self { decomposition, shifted: hankel(2), direct: markov[0].clone() })
     }
 

@@ -1,6 +1,6 @@
 //! Finite impulse response by least squares: the first stage of the chain.
 
-use super::{NormalEquations, dot};
+use super::fir_statistic::{FirStatistic, Sums};
 use crate::{Error, Experiment, Matrix, Record};
 
 /// A finite impulse response model, equation (17) of the paper:
@@ -23,12 +23,12 @@ pub struct Fir {
 }
 
 impl Fir {
-    /// A direction counts as excited when its singular value exceeds this fraction of the largest.
-    pub const EXCITATION_TOLERANCE: f64 = 1e-6;
+    /// A direction counts as excited when its singular value exceeds this fraction of the largest: smaller ones
+    /// are rounding.
+    pub const EXCITATION_TOLERANCE: f64 = 1e-13;
 
-    /// Ratio of the largest to the smallest singular value of the regressor.
-    ///
-    /// It is computed from squares, so values above 1e8 say no more than "at least that".
+    /// Ratio of the largest to the smallest singular value of the regressor: by so much errors of the output may
+    /// grow in the taps.
     pub fn condition(&self) -> f64 {
         match (self.singular_values.first(), self.singular_values.last()) {
             (Some(largest), Some(smallest)) => largest / smallest,
@@ -57,8 +57,7 @@ impl Fir {
 /// per experiment.
 ///
 /// The rows are those samples that are scored and whose past reaches back `taps - 1` samples. The
-/// regressor (rows x taps inputs) is never built: its Gram matrix is Toeplitz up to the edges, so the
-/// first block row and a two-term recurrence give all of it in `O(rows taps inputs^2)`.
+/// regressor (rows x taps inputs) is never built: see [`FirStatistic`], which also takes records in parts.
 ///
 /// `ridge` = 0 is plain least squares. A positive one leaves out what the input hardly excites (a
 /// band without excitation, say), where plain estimates are noise that [`realize`](super::realize)
@@ -81,45 +80,65 @@ impl Fir {
 /// No taps, a negative ridge, fewer samples than unknowns. Weak excitation is not an error here: see [`Fir::rank`].
 pub fn estimate(record: &Record, taps: usize, ridge: f64) -> Result<Fir, Error> {
     let inputs = record.inputs().len();
-    let outputs = record.outputs().len();
-    if taps == 0 {
-        return Err(Error::parameter("taps", taps, "at least one tap is needed"));
+    let runs = record.experiments();
+    let rows = |e: &Experiment| e.input.nrows().saturating_sub(e.warmup.max(taps.max(1) - 1));
+    require_samples(runs.iter().map(rows).sum(), taps, inputs, runs.len())?;
+    gathered(record, taps)?.solve(ridge)
+}
+
+fn gathered(record: &Record, taps: usize) -> Result<FirStatistic, Error> {
+    let mut statistic = FirStatistic::new(taps, record.inputs().len(), record.outputs().len())?;
+    for experiment in record.experiments() {
+        statistic.begin(experiment.warmup);
+        statistic.take(&experiment.input, &experiment.output);
     }
-    if !(ridge >= 0.0 && ridge.is_finite()) {
-        return Err(Error::parameter("ridge", ridge, "must be zero or positive"));
+    Ok(statistic)
+}
+
+impl FirStatistic {
+    /// The least squares estimate from all that came; `ridge` as for [`estimate`].
+    ///
+    /// # Errors
+    /// A negative ridge, fewer samples than unknowns.
+    pub fn solve(&self, ridge: f64) -> Result<Fir, Error> {
+        if !(ridge >= 0.0 && ridge.is_finite()) {
+            return Err(Error::parameter("ridge", ridge, "must be zero or positive"));
+        }
+        let (taps, inputs, outputs) = self.shape();
+        let (samples, unknowns) = (self.samples(), taps * inputs);
+        require_samples(samples, taps, inputs, self.experiments())?;
+        let (factor, sums) = self.decompose();
+        let solution = factor.solve(Fir::EXCITATION_TOLERANCE, ridge)?;
+        let squares = &solution.residual_squares;
+        let tap = |lag| Matrix::from_fn(outputs, inputs, |o, i| solution.x[(i * taps + lag, o)]);
+        let offsets = Matrix::from_fn(sums.len(), outputs, |e, o| {
+            let Sums { count, columns } = &sums[e];
+            let driven = columns.rows(0, unknowns).dot(&solution.x.column(o));
+            (columns[unknowns + o] - driven) / (*count).max(1) as f64
+        });
+        Ok(Fir {
+            markov: (0..taps).map(tap).collect(),
+            offsets,
+            singular_values: solution.singular_values,
+            rank: solution.rank,
+            residual_rms: squares.iter().map(|sum| (sum / samples as f64).sqrt()).collect(),
+            samples,
+        })
     }
-    let unknowns = taps * inputs;
-    let windows: Vec<_> = record.experiments().iter().map(|e| rows(e, taps)).collect();
-    let samples = windows.iter().map(ExactSizeIterator::len).sum();
-    if samples < unknowns + windows.len() {
+}
+
+fn require_samples(
+    samples: usize,
+    taps: usize,
+    inputs: usize,
+    experiments: usize,
+) -> Result<(), Error> {
+    let needed = taps.saturating_mul(inputs).saturating_add(experiments);
+    if samples < needed {
         let purpose = format!("{taps} taps x {inputs} inputs and an offset per experiment");
-        return Err(Error::TooFewSamples { samples, needed: unknowns + windows.len(), purpose });
+        return Err(Error::TooFewSamples { samples, needed, purpose });
     }
-    let mut equations = NormalEquations::zeros(unknowns, outputs);
-    let mut means = Vec::new();
-    for (experiment, window) in record.experiments().iter().zip(windows) {
-        means.push(accumulate(&mut equations, experiment, window, taps));
-    }
-    let solution = equations.solve(Fir::EXCITATION_TOLERANCE, ridge)?;
-    let squares = equations.residual_squares(&solution.x);
-    let markov: Vec<Matrix> = (0..taps)
-        .map(|lag| Matrix::from_fn(outputs, inputs, |o, i| solution.x[(i * taps + lag, o)]))
-        .collect();
-    let dc: Matrix = markov.iter().sum();
-    let offsets = Matrix::from_fn(means.len(), outputs, |e, o| {
-        let (input, output, drift) = &means[e];
-        // the mean of each regressor column differs from the input's mean by its edges
-        let driven = dc.row(o).transpose().dot(input) + drift.dot(&solution.x.column(o));
-        output[o] - driven
-    });
-    Ok(Fir {
-        markov,
-        offsets,
-        singular_values: solution.singular_values,
-        rank: solution.rank,
-        residual_rms: squares.iter().map(|sum| (sum / samples as f64).sqrt()).collect(),
-        samples,
-    })
+    Ok(())
 }
 
 /// The largest number of taps that the input of a record supports, `usize::MAX` when more taps always
@@ -134,100 +153,13 @@ pub(crate) fn excitation_limit(record: &Record) -> Result<usize, Error> {
     let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
     let lags = (longest / (4 * inputs)).clamp(2, 64);
     let rank = |lags: usize| -> Result<usize, Error> {
-        let mut equations = NormalEquations::zeros(lags * inputs, record.outputs().len());
-        for experiment in record.experiments() {
-            accumulate(&mut equations, experiment, rows(experiment, lags), lags);
-        }
-        let eigenvalues = super::decompose::symmetric_eigen(&equations.gram)?.0;
-        let floor = FLOOR * eigenvalues.mean();
-        Ok(eigenvalues.iter().filter(|&&value| value > floor).count())
+        let (factor, _) = gathered(record, lags)?.decompose();
+        let values = factor.singular_values()?;
+        let powers = values.iter().map(|value| value * value);
+        let floor = FLOOR * powers.clone().sum::<f64>() / values.len() as f64;
+        Ok(powers.filter(|&power| power > floor).count())
     };
     let (half, full) = (rank(lags / 2)?, rank(lags)?);
     let saturated = full < lags * inputs && full <= half + inputs;
     Ok(if saturated { full.div_ceil(inputs).max(1) } else { usize::MAX })
-}
-
-/// The rows of an experiment that have a full past and are scored.
-fn rows(experiment: &Experiment, taps: usize) -> std::ops::Range<usize> {
-    let end = experiment.input.nrows();
-    experiment.warmup.max(taps - 1).min(end)..end
-}
-
-type Vector = nalgebra::DVector<f64>;
-
-/// Adds one experiment's centred equations; returns the means of input and output, and how much the
-/// mean of each regressor column exceeds that of its input.
-fn accumulate(
-    equations: &mut NormalEquations,
-    experiment: &Experiment,
-    window: std::ops::Range<usize>,
-    taps: usize,
-) -> (Vector, Vector, Vector) {
-    let (start, end) = (window.start, window.end);
-    let count = window.len();
-    let mean = |matrix: &Matrix| -> Vector {
-        let rows = matrix.rows(start, count);
-        Vector::from_iterator(rows.ncols(), rows.column_iter().map(|column| column.mean()))
-    };
-    if count == 0 {
-        let (input, output) = (mean_of_none(&experiment.input), mean_of_none(&experiment.output));
-        return (input, output, Vector::zeros(equations.rhs.nrows()));
-    }
-    let (input_mean, output_mean) = (mean(&experiment.input), mean(&experiment.output));
-    let centred = |matrix: &Matrix, mean: &Vector| -> Vec<Vec<f64>> {
-        let columns = matrix.column_iter().zip(mean.iter());
-        columns.map(|(column, mean)| column.iter().map(|value| value - mean).collect()).collect()
-    };
-    let u = centred(&experiment.input, &input_mean);
-    let y = centred(&experiment.output, &output_mean);
-
-    // Sums of the lagged columns over the window; what the centring left over at the edges.
-    let mut sums = Vector::zeros(taps * u.len());
-    for (channel, column) in u.iter().enumerate() {
-        let mut sum: f64 = column[start..end].iter().sum();
-        for lag in 0..taps {
-            sums[channel * taps + lag] = sum;
-            if lag + 1 < taps {
-                sum += column[start - 1 - lag] - column[end - 1 - lag];
-            }
-        }
-    }
-    let mut gram = Matrix::zeros(sums.len(), sums.len());
-    for (a, left) in u.iter().enumerate() {
-        for (b, right) in u.iter().enumerate().skip(a) {
-            let (row, column) = (a * taps, b * taps);
-            for lag in 0..taps {
-                gram[(row, column + lag)] = dot(&left[start..end], &right[start - lag..end - lag]);
-                gram[(row + lag, column)] = dot(&left[start - lag..end - lag], &right[start..end]);
-            }
-            for j in 1..taps {
-                for i in 1..taps {
-                    gram[(row + i, column + j)] = gram[(row + i - 1, column + j - 1)]
-                        + left[start - i] * right[start - j]
-                        - left[end - i] * right[end - j];
-                }
-            }
-            if a != b {
-                let block = gram.view((row, column), (taps, taps)).transpose();
-                gram.view_mut((column, row), (taps, taps)).copy_from(&block);
-            }
-        }
-    }
-    gram.ger(-1.0 / count as f64, &sums, &sums, 1.0);
-    equations.gram += gram;
-    for (output, target) in y.iter().enumerate() {
-        let target = &target[start..end];
-        for (channel, column) in u.iter().enumerate() {
-            for lag in 0..taps {
-                equations.rhs[(channel * taps + lag, output)] +=
-                    dot(&column[start - lag..end - lag], target);
-            }
-        }
-        equations.squares[output] += dot(target, target);
-    }
-    (input_mean, output_mean, sums / count as f64)
-}
-
-fn mean_of_none(matrix: &Matrix) -> Vector {
-    Vector::zeros(matrix.ncols())
 }

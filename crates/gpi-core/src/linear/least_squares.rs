@@ -1,7 +1,7 @@
 //! Least squares from normal equations, with rank and condition, free or non-negative.
 
-use super::decompose::{solve_positive, symmetric_eigen};
-use crate::{Error, Matrix};
+use super::decompose::solve_positive;
+use crate::Matrix;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DVector;
@@ -15,16 +15,6 @@ pub(crate) struct NormalEquations {
     pub rhs: Matrix,
     /// Sum of squares of each target.
     pub squares: DVector<f64>,
-}
-
-/// The minimum-norm solution and what its trustworthiness rests on.
-pub(crate) struct Solution {
-    /// (unknowns, targets).
-    pub x: Matrix,
-    /// Singular values of the regressor, descending.
-    pub singular_values: Vec<f64>,
-    /// How many of them exceed the tolerance times the largest.
-    pub rank: usize,
 }
 
 impl NormalEquations {
@@ -44,25 +34,6 @@ impl NormalEquations {
         for (sum, row) in self.squares.iter_mut().zip(targets.row_iter()) {
             *sum += row.norm_squared();
         }
-    }
-
-    /// The minimum-norm solution over the directions whose singular value exceeds `tolerance` times
-    /// the largest. Singular values below 1e-8 of the largest are lost in the squares' rounding.
-    ///
-    /// `ridge`, relative to the mean eigenvalue, regularizes by three passes of iterated ridge
-    /// regression, which hardly biases what is well excited.
-    pub(crate) fn solve(&self, tolerance: f64, ridge: f64) -> Result<Solution, Error> {
-        let (eigenvalues, vectors) = symmetric_eigen(&self.gram)?;
-        let singular_values: Vec<f64> = eigenvalues.iter().map(|l| l.max(0.0).sqrt()).collect();
-        let floor = tolerance * singular_values.first().copied().unwrap_or(0.0);
-        let rank = singular_values.iter().take_while(|&&value| value > floor).count();
-        let excited = vectors.columns(0, rank);
-        let mut projected = excited.tr_mul(&self.rhs);
-        let penalty = ridge * eigenvalues.mean();
-        for (mut row, eigenvalue) in projected.row_iter_mut().zip(eigenvalues.iter()) {
-            row *= (1.0 - (penalty / (penalty + eigenvalue)).powi(3)) / eigenvalue;
-        }
-        Ok(Solution { x: excited * projected, singular_values, rank })
     }
 
     /// Sum of squared residuals of each target at `x`.
@@ -201,16 +172,6 @@ fn passive_solution(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn minimum_norm_on_a_deficient_regressor() {
-        let mut equations = NormalEquations::zeros(2, 1);
-        equations.add(&Matrix::from_element(2, 3, 1.0), &Matrix::from_element(1, 3, 4.0));
-        let solution = equations.solve(1e-6, 0.0).unwrap();
-        assert_eq!(solution.rank, 1);
-        assert!((solution.x[0] - 2.0).abs() < 1e-12 && (solution.x[1] - 2.0).abs() < 1e-12);
-        assert!(equations.residual_squares(&solution.x)[0] < 1e-12);
-    }
 
     #[test]
     fn bounds_hold_and_the_conditions_of_optimality_too() {

@@ -16,6 +16,13 @@ use super::{Deadzones, DeadzonesState, Operator, PlayBank, PlayBankState, Storag
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "identify",
+    serde(bound(
+        serialize = "E: Clone + serde::Serialize, S: serde::Serialize",
+        deserialize = "E: Storage + serde::Deserialize<'de>, S: serde::Deserialize<'de>"
+    ))
+)]
 pub struct Gpi<E, S> {
     envelope: Deadzones<E>,
     plays: PlayBank<S>,

@@ -1,6 +1,7 @@
 //! The envelope D: a weighted sum of deadzones.
 
 use super::error::{require_finite, require_length};
+use super::storage::sum;
 use super::{Operator, OperatorError, Sample, Storage};
 
 /// How the deadzone Z_eta is read; the paper's text and its equation (3) disagree.
@@ -67,10 +68,46 @@ impl Reading {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "identify", serde(try_from = "Parameters<S>", into = "Parameters<S>"))]
+#[cfg_attr(
+    feature = "identify",
+    serde(bound(
+        serialize = "S: Clone + serde::Serialize",
+        deserialize = "S: Storage + serde::Deserialize<'de>"
+    ))
+)]
 pub struct Deadzones<S> {
     thresholds: S,
     weights: S,
     reading: Reading,
+    /// The one-sided deadzone of each threshold is `u - clamp(u, lower, upper)`: which side it leaves out is known
+    /// beforehand, so that no sample has to ask.
+    lower: S,
+    upper: S,
+}
+
+/// What a file holds of [`Deadzones`].
+#[cfg(feature = "identify")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Parameters<S> {
+    thresholds: S,
+    weights: S,
+    reading: Reading,
+}
+
+#[cfg(feature = "identify")]
+impl<S: Storage> TryFrom<Parameters<S>> for Deadzones<S> {
+    type Error = OperatorError;
+    fn try_from(read: Parameters<S>) -> Result<Self, OperatorError> {
+        Self::new(read.thresholds, read.weights, read.reading)
+    }
+}
+
+#[cfg(feature = "identify")]
+impl<S> From<Deadzones<S>> for Parameters<S> {
+    fn from(zones: Deadzones<S>) -> Self {
+        Self { thresholds: zones.thresholds, weights: zones.weights, reading: zones.reading }
+    }
 }
 
 /// The previous input u(k-1), which the [`Reading::Directional`] deadzone compares with.
@@ -90,7 +127,16 @@ impl<S: Storage> Deadzones<S> {
         require_length("weights", weights.values().len(), thresholds.values().len())?;
         require_finite("thresholds", thresholds.values())?;
         require_finite("weights", weights.values())?;
-        Ok(Self { thresholds, weights, reading })
+        let (zero, infinity) = (S::Item::ZERO, S::Item::INFINITY);
+        let (mut lower, mut upper) = (thresholds.clone(), thresholds.clone());
+        for (lower, upper) in lower.values_mut().iter_mut().zip(upper.values_mut()) {
+            if *lower > zero {
+                *lower = -infinity;
+            } else if *upper < zero {
+                *upper = infinity;
+            }
+        }
+        Ok(Self { thresholds, weights, reading, lower, upper })
     }
 
     /// The thresholds eta_j, in the input's unit.
@@ -126,12 +172,20 @@ impl<S: Storage> Operator for Deadzones<S> {
 
     #[inline]
     fn step(&self, state: &mut DeadzonesState<S::Item>, input: S::Item) -> S::Item {
-        let mut sum = S::Item::ZERO;
-        for (&threshold, &weight) in self.thresholds.values().iter().zip(self.weights.values()) {
-            sum = sum + weight * self.zone(threshold, state.previous, input);
+        let count = self.thresholds.values().len();
+        let weights = &self.weights.values()[..count];
+        let previous = core::mem::replace(&mut state.previous, input);
+        match self.reading {
+            Reading::OneSided => {
+                let lower = &self.lower.values()[..count];
+                let upper = &self.upper.values()[..count];
+                sum(count, |j| weights[j] * (input - input.at_most(upper[j]).at_least(lower[j])))
+            }
+            Reading::Directional => {
+                let thresholds = self.thresholds.values();
+                sum(count, |j| weights[j] * self.zone(thresholds[j], previous, input))
+            }
         }
-        state.previous = input;
-        sum
     }
 
     fn block(

@@ -1,6 +1,7 @@
 //! The play operator F and the weighted bank P of plays.
 
 use super::error::{require_finite, require_length};
+use super::storage::sum;
 use super::{Operator, OperatorError, Sample, Storage};
 
 /// One step of the play operator, equation (7) of the paper:
@@ -17,15 +18,7 @@ use super::{Operator, OperatorError, Sample, Storage};
 /// ```
 #[inline]
 pub fn play<T: Sample>(half_width: T, input: T, previous: T) -> T {
-    let lower = input - half_width;
-    let upper = input + half_width;
-    if lower > previous {
-        lower
-    } else if upper < previous {
-        upper
-    } else {
-        previous
-    }
+    previous.at_most(input + half_width).at_least(input - half_width)
 }
 
 /// A weighted bank of plays, equation (11) of the paper: `v(k) = sum_i p_i F_{r_i}[z](k)`.
@@ -98,6 +91,38 @@ impl<S: Storage> PlayBank<S> {
     }
 }
 
+#[cfg(feature = "identify")]
+impl PlayBank<Vec<f64>> {
+    /// [`Operator::block`] on several threads, each a stretch of time: it pays from about a million samples on.
+    ///
+    /// Where z does not sweep twice the largest half-width within a stretch, one thread does all. The same as
+    /// [`Operator::block`] up to rounding.
+    ///
+    /// ```
+    /// use gpi_core::operators::{Operator, PlayBank};
+    /// let bank = PlayBank::new(vec![0.1, 0.4], vec![1.0, 2.0])?;
+    /// let input: Vec<f64> = (0..1000).map(|k| (0.3 * f64::from(k)).sin()).collect();
+    /// let (mut alone, mut shared) = (input.clone(), input.clone());
+    /// bank.block(&mut bank.rest(), &input, &mut alone);
+    /// bank.block_on(2, &mut bank.rest(), &input, &mut shared);
+    /// assert!(alone.iter().zip(&shared).all(|(a, b)| (a - b).abs() < 1e-14));
+    /// # Ok::<(), gpi_core::operators::OperatorError>(())
+    /// ```
+    pub fn block_on(
+        &self,
+        threads: usize,
+        state: &mut PlayBankState<Vec<f64>>,
+        input: &[f64],
+        output: &mut [f64],
+    ) -> usize {
+        let samples = input.len().min(output.len());
+        let (input, output) = (&input[..samples], &mut output[..samples]);
+        let parameters = (&self.half_widths[..], &self.weights[..]);
+        super::block::threads::run(parameters, &mut state.plays, input, output, threads);
+        samples
+    }
+}
+
 impl<S: Storage> PlayBankState<S> {
     /// The play outputs, for saving.
     pub fn plays(&self) -> &[S::Item] {
@@ -116,13 +141,13 @@ impl<S: Storage> Operator for PlayBank<S> {
 
     #[inline]
     fn step(&self, state: &mut PlayBankState<S>, input: S::Item) -> S::Item {
-        let mut sum = S::Item::ZERO;
-        let configuration = self.half_widths.values().iter().zip(self.weights.values());
-        for ((&half_width, &weight), output) in configuration.zip(state.plays.values_mut()) {
-            *output = play(half_width, input, *output);
-            sum = sum + weight * *output;
-        }
-        sum
+        let count = self.half_widths.values().len();
+        let (half_widths, weights) = (self.half_widths.values(), self.weights.values());
+        let (weights, places) = (&weights[..count], &mut state.plays.values_mut()[..count]);
+        sum(count, |i| {
+            places[i] = play(half_widths[i], input, places[i]);
+            weights[i] * places[i]
+        })
     }
 
     fn block(
@@ -132,33 +157,60 @@ impl<S: Storage> Operator for PlayBank<S> {
         output: &mut [S::Item],
     ) -> usize {
         let samples = input.len().min(output.len());
-        output[..samples].copy_from_slice(&input[..samples]);
-        self.in_place(state, &mut output[..samples]);
+        let (input, output) = (&input[..samples], &mut output[..samples]);
+        if !self.at_length(state, Some(input), output) {
+            for (value, &sample) in output.iter_mut().zip(input) {
+                *value = self.step(state, sample);
+            }
+        }
         samples
     }
 
     /// On a host a long record takes the fastest way there is: by turning points where z goes on, over several
     /// stretches of time side by side where it turns all the time. The same as [`Operator::step`] up to rounding.
     fn in_place(&self, state: &mut PlayBankState<S>, signal: &mut [S::Item]) {
-        #[cfg(feature = "identify")]
-        {
-            use super::block::bank;
-            let (widths, weights) = (self.half_widths.values(), self.weights.values());
-            if bank::pays(widths.len(), signal.len())
-                && let (Some(widths), Some(weights), Some(places), Some(signal)) = (
-                    S::Item::doubles(widths),
-                    S::Item::doubles(weights),
-                    S::Item::doubles_mut(state.plays.values_mut()),
-                    S::Item::doubles_mut(signal),
-                )
-            {
-                bank::in_place(widths, weights, places, signal);
-                return;
+        if !self.at_length(state, None, signal) {
+            for value in signal {
+                *value = self.step(state, *value);
             }
         }
-        for value in signal {
-            *value = self.step(state, *value);
+    }
+}
+
+impl<S: Storage> PlayBank<S> {
+    /// The outputs of a long record on a host, of `input` or in place; `false`, and nothing done, of others.
+    #[cfg(feature = "identify")]
+    fn at_length(
+        &self,
+        state: &mut PlayBankState<S>,
+        input: Option<&[S::Item]>,
+        signal: &mut [S::Item],
+    ) -> bool {
+        use super::block::bank;
+        let (widths, weights) = (self.half_widths.values(), self.weights.values());
+        if !bank::pays(widths.len(), signal.len()) {
+            return false;
         }
+        let (Some(widths), Some(weights), Some(places), Some(signal)) = (
+            S::Item::doubles(widths),
+            S::Item::doubles(weights),
+            S::Item::doubles_mut(state.plays.values_mut()),
+            S::Item::doubles_mut(signal),
+        ) else {
+            return false;
+        };
+        bank::run((widths, weights), places, input.and_then(S::Item::doubles), signal);
+        true
+    }
+
+    #[cfg(not(feature = "identify"))]
+    fn at_length(
+        &self,
+        _: &mut PlayBankState<S>,
+        _: Option<&[S::Item]>,
+        _: &mut [S::Item],
+    ) -> bool {
+        false
     }
 }
 

@@ -16,8 +16,20 @@ pub trait Sample:
     const ZERO: Self;
     /// The multiplicative identity.
     const ONE: Self;
+    /// Positive infinity.
+    const INFINITY: Self;
     /// Neither NaN nor infinite.
     fn finite(self) -> bool;
+    /// The smaller one; `self` where either is NaN.
+    #[inline]
+    fn at_most(self, limit: Self) -> Self {
+        if limit < self { limit } else { self }
+    }
+    /// The larger one; `self` where either is NaN.
+    #[inline]
+    fn at_least(self, limit: Self) -> Self {
+        if limit > self { limit } else { self }
+    }
     /// The values, where they are `f64`.
     fn doubles(_: &[Self]) -> Option<&[f64]> {
         None
@@ -33,6 +45,7 @@ macro_rules! impl_sample {
         impl Sample for $number {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
+            const INFINITY: Self = <$number>::INFINITY;
             fn finite(self) -> bool {
                 self.is_finite()
             }
@@ -50,6 +63,27 @@ impl_sample! {
     fn doubles_mut(values: &mut [Self]) -> Option<&mut [f64]> {
         Some(values)
     }
+}
+
+/// Terms that are summed side by side: sums that wait for each other are what a sample's time goes into.
+const SIDE_BY_SIDE: usize = 4;
+
+/// The sum of `term(i)` over `0..count`.
+#[inline(always)]
+pub(super) fn sum<T: Sample>(count: usize, mut term: impl FnMut(usize) -> T) -> T {
+    let mut sums = [T::ZERO; SIDE_BY_SIDE];
+    let whole = count - count % SIDE_BY_SIDE;
+    let mut first = 0;
+    while first < whole {
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum = *sum + term(first + i);
+        }
+        first += SIDE_BY_SIDE;
+    }
+    for i in whole..count {
+        sums[0] = sums[0] + term(i);
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
 /// An array of samples: `[T; N]` on firmware (no heap), `Vec<T>` on a host.

@@ -3,22 +3,22 @@
 use super::lanes;
 use super::ranked::Ranked;
 use super::turning_points::TurningPoints;
-use crate::operators::play;
 use pulp::Simd;
 
-/// Samples for which a way is chosen; they stay in the processor's second cache.
-const BLOCK: usize = 32_768;
+/// Samples for which a way is chosen; they stay in the processor's second cache. An eighth of them is no power of two,
+/// whose multiples would all go to one place of the first cache.
+const BLOCK: usize = 32_704;
 
-/// Outputs of a bank of plays in place of its inputs, long ones; `places` move on.
+/// Outputs of a bank of plays, long ones, of `input` or in place of their inputs; `places` move on.
 ///
 /// The same as sample by sample up to rounding. What is not finite goes that way.
-pub(crate) fn in_place(
-    half_widths: &[f64],
-    weights: &[f64],
+pub(crate) fn run(
+    (half_widths, weights): (&[f64], &[f64]),
     places: &mut [f64],
+    input: Option<&[f64]>,
     signal: &mut [f64],
 ) {
-    pulp::Arch::new().dispatch(Bank { half_widths, weights, places, signal });
+    pulp::Arch::new().dispatch(Bank { half_widths, weights, places, input, signal });
 }
 
 /// Whether a signal is long enough for it to pay that the bank is put in order first.
@@ -31,6 +31,7 @@ struct Bank<'a> {
     half_widths: &'a [f64],
     weights: &'a [f64],
     places: &'a mut [f64],
+    input: Option<&'a [f64]>,
     signal: &'a mut [f64],
 }
 
@@ -39,28 +40,37 @@ impl pulp::WithSimd for Bank<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { half_widths, weights, places, signal } = self;
+        let Self { half_widths, weights, places, input, signal } = self;
         let ranked = Ranked::new(half_widths, weights);
-        let mut input = vec![0.0; BLOCK.min(signal.len())];
+        let mut copy = Vec::new();
         let mut held: Option<TurningPoints> = None;
-        for block in signal.chunks_mut(BLOCK) {
-            let input = &mut input[..block.len()];
-            input.copy_from_slice(block);
-            let way = way(input, places.len());
-            if way == Way::Turns && held.is_none() {
-                held = TurningPoints::new(&ranked, weights, places, input[0]);
+        for (index, block) in signal.chunks_mut(BLOCK).enumerate() {
+            let given = input.map(|input| &input[index * BLOCK..][..block.len()]);
+            let way = way(given.unwrap_or(block), places.len() <= FEW_A_LANE * S::F64_LANES);
+            if way == Way::Turns {
+                let input = given.unwrap_or_else(|| {
+                    copy.clear();
+                    copy.extend_from_slice(block);
+                    &copy
+                });
+                if held.is_none() {
+                    held = TurningPoints::new(&ranked, weights, places, input[0]);
+                }
+                if let Some(held) = &mut held {
+                    held.run(simd, input, block);
+                    continue;
+                }
             }
-            if let (Way::Turns, Some(held)) = (way, &mut held) {
-                held.run(simd, input, block);
-                continue;
+            if let Some(given) = given {
+                block.copy_from_slice(given);
             }
             if let Some(held) = held.take() {
                 held.write_places(places);
             }
-            let is_done =
-                way == Way::Lanes && lanes::run(simd, half_widths, weights, places, input, block);
+            let is_done = way == Way::Lanes
+                && lanes::run(simd, &ranked, (half_widths, weights), places, block);
             if !is_done {
-                one_by_one(half_widths, weights, places, input, block);
+                lanes::one_by_one(half_widths, weights, places, block);
             }
         }
         if let Some(held) = held {
@@ -79,35 +89,20 @@ enum Way {
     OneByOne,
 }
 
+/// Plays for each number that a vector holds up to which noise is followed one by one.
+const FEW_A_LANE: usize = 32;
+
 /// Where z often turns, few plays are followed faster one by one than by their turning points.
-fn way(input: &[f64], plays: usize) -> Way {
+fn way(input: &[f64], are_few: bool) -> Way {
     /// Of a block that tell how it goes on.
     const PROBE: usize = 128;
-    /// Plays up to which noise is followed one by one.
-    const FEW: usize = 40;
     /// Samples for each reversal of noise.
     const OFTEN: usize = 8;
-    if !input.iter().all(|z| z.is_finite()) {
+    // counted, since to stop at the first one takes longer than to look at all
+    if input.iter().filter(|z| !z.is_finite()).count() > 0 {
         return Way::OneByOne;
     }
     let probe = &input[..input.len().min(PROBE)];
     let turns = probe.windows(3).filter(|z| (z[1] - z[0]) * (z[2] - z[1]) < 0.0).count();
-    if turns * OFTEN > probe.len() && plays <= FEW { Way::Lanes } else { Way::Turns }
-}
-
-/// Each sample by the definition.
-fn one_by_one(
-    half_widths: &[f64],
-    weights: &[f64],
-    places: &mut [f64],
-    input: &[f64],
-    output: &mut [f64],
-) {
-    for (z, v) in input.iter().zip(output) {
-        *v = 0.0;
-        for ((place, &r), weight) in places.iter_mut().zip(half_widths).zip(weights) {
-            *place = play(r, *z, *place);
-            *v += weight * *place;
-        }
-    }
+    if turns * OFTEN > probe.len() && are_few { Way::Lanes } else { Way::Turns }
 }

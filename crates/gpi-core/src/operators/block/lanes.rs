@@ -1,127 +1,155 @@
 //! Plays of noise, one after the other, over several stretches of time side by side.
 
+use super::ranked::Ranked;
 use crate::operators::play;
 use pulp::Simd;
 
 /// Stretches side by side: what the widest vectors of today's processors hold.
 const LANES: usize = 8;
 type Lanes = [f64; LANES];
+/// Samples of each lane that are brought side by side at once: a vector that is read back as soon as its lanes are
+/// written, or the other way, would wait for them.
+const AT_ONCE: usize = 64;
 
-/// The outputs of plays that stand at `places`, and where they stand at the end; `false`, and nothing done, where
-/// some play does not forget within a stretch how it began.
+/// Replaces inputs by the outputs of plays that stand at `places`, which move on; `false`, and nothing done, where some
+/// play does not forget within a stretch how it began.
 #[inline(always)]
 pub(super) fn run<S: Simd>(
     simd: S,
-    half_widths: &[f64],
-    weights: &[f64],
+    bank: &Ranked,
+    (half_widths, weights): (&[f64], &[f64]),
     places: &mut [f64],
-    input: &[f64],
-    output: &mut [f64],
+    signal: &mut [f64],
 ) -> bool {
-    let stretch = input.len() / LANES;
-    let widest = half_widths.iter().copied().fold(0.0, f64::max);
-    let mut stand = vec![[0.0; LANES]; places.len()];
-    for lane in 0..LANES {
-        let begin = lane * stretch;
-        let known =
-            if lane == 0 { Some(begin) } else { forgotten(&input[..begin], widest, stretch) };
-        let Some(first) = known else { return false };
-        for ((stand, &r), place) in stand.iter_mut().zip(half_widths).zip(&*places) {
-            let before = input[first..begin].iter();
-            stand[lane] = before.fold(*place, |place, &z| play(r, z, place));
-        }
+    let stretch = signal.len() / LANES;
+    let mut stand: Vec<Lanes> = places.iter().map(|&place| [place; LANES]).collect();
+    for lane in 1..LANES {
+        let Some(places) = settled(bank, &signal[..lane * stretch], stretch) else {
+            return false;
+        };
+        stand.iter_mut().zip(&places).for_each(|(stand, place)| stand[lane] = *place);
     }
-    /// Samples of each lane that are brought side by side at once: a vector that is read back as soon as its lanes
-    /// are written, or the other way, would wait for them.
-    const AT_ONCE: usize = 64;
     let mut beside = [[0.0; LANES]; AT_ONCE];
     for first in (0..stretch).step_by(AT_ONCE) {
         let count = AT_ONCE.min(stretch - first);
         for lane in 0..LANES {
-            let own = &input[lane * stretch + first..][..count];
+            let own = &signal[lane * stretch + first..][..count];
             own.iter().zip(&mut beside).for_each(|(z, beside)| beside[lane] = *z);
         }
-        for z in &mut beside[..count] {
-            *z = follow(simd, z, half_widths, weights, &mut stand);
-        }
+        follow(simd, half_widths, weights, &mut stand, &mut beside[..count]);
         for lane in 0..LANES {
-            let own = &mut output[lane * stretch + first..][..count];
+            let own = &mut signal[lane * stretch + first..][..count];
             own.iter_mut().zip(&beside).for_each(|(v, beside)| *v = beside[lane]);
         }
     }
     for (place, stand) in places.iter_mut().zip(&stand) {
         *place = stand[LANES - 1];
     }
-    let rest = LANES * stretch;
-    for (z, v) in input[rest..].iter().zip(&mut output[rest..]) {
-        *v = 0.0;
-        for ((place, &r), weight) in places.iter_mut().zip(half_widths).zip(weights) {
-            *place = play(r, *z, *place);
-            *v += weight * *place;
-        }
-    }
+    one_by_one(half_widths, weights, places, &mut signal[LANES * stretch..]);
     true
 }
 
-/// The place from which on plays of at most this half-width end where they do wherever they began: z sweeps
-/// `2 r` there. At most so many samples back.
-fn forgotten(input: &[f64], widest: f64, most: usize) -> Option<usize> {
+/// Where plays stand after these samples wherever they stood before: what z was last at the far side of each gap
+/// before it swept all of it holds the play. `None` where it does not sweep the widest gap in the latest `most` samples.
+pub(super) fn settled(bank: &Ranked, samples: &[f64], most: usize) -> Option<Vec<f64>> {
+    let mut places = vec![0.0; bank.len()];
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for (k, &z) in input.iter().enumerate().rev().take(most) {
-        (low, high) = (low.min(z), high.max(z));
-        if high - low >= 2.0 * widest {
-            return Some(k);
+    let mut rank = 0;
+    for &z in samples.iter().rev().take(most) {
+        while let Some(&r) = bank.half_widths.get(rank) {
+            let place = if high - z >= 2.0 * r {
+                high - r
+            } else if z - low >= 2.0 * r {
+                low + r
+            } else {
+                break;
+            };
+            places[bank.order[rank]] = place;
+            rank += 1;
         }
+        if rank == bank.len() {
+            return Some(places);
+        }
+        (low, high) = (low.min(z), high.max(z));
     }
     None
 }
 
-/// One sample of each lane.
+/// Replaces some samples of each lane by the outputs of all plays.
 #[inline(always)]
 fn follow<S: Simd>(
     simd: S,
-    z: &Lanes,
     half_widths: &[f64],
     weights: &[f64],
     stand: &mut [Lanes],
-) -> Lanes {
-    /// Sums that do not wait for each other.
-    const SUMS: usize = 4;
-    let mut v = [0.0; LANES];
-    let parts = S::as_simd_f64s(z).0.iter().zip(S::as_mut_simd_f64s(&mut v).0);
-    for (part, (z, v)) in parts.enumerate() {
-        let mut sums = [simd.splat_f64s(0.0); SUMS];
-        let mut places = stand.chunks_exact_mut(SUMS);
-        let (mut r, mut p) = (half_widths.chunks_exact(SUMS), weights.chunks_exact(SUMS));
-        for ((places, r), p) in (&mut places).zip(&mut r).zip(&mut p) {
-            for i in 0..SUMS {
-                one(simd, part, *z, r[i], p[i], &mut places[i], &mut sums[i]);
-            }
-        }
-        let rest = places.into_remainder().iter_mut().zip(r.remainder()).zip(p.remainder());
-        for ((place, &r), &p) in rest {
-            one(simd, part, *z, r, p, place, &mut sums[0]);
-        }
-        let [a, b, c, d] = sums;
-        *v = simd.add_f64s(simd.add_f64s(a, b), simd.add_f64s(c, d));
+    beside: &mut [Lanes],
+) {
+    let mut sums = [[0.0; LANES]; AT_ONCE];
+    let sums = &mut sums[..beside.len()];
+    let mut plays = (half_widths, weights, stand);
+    while !plays.2.is_empty() {
+        plays = match plays.2.len() {
+            8.. => some::<S, 8>(simd, plays, beside, sums),
+            4.. => some::<S, 4>(simd, plays, beside, sums),
+            2.. => some::<S, 2>(simd, plays, beside, sums),
+            _ => some::<S, 1>(simd, plays, beside, sums),
+        };
     }
-    v
+    beside.copy_from_slice(sums);
 }
 
-/// One play of some lanes, and its part of the sum.
+/// Half-widths, weights and where the plays stand in each lane.
+type Plays<'a> = (&'a [f64], &'a [f64], &'a mut [Lanes]);
+
+/// Adds the outputs of the first plays, which stay in registers meanwhile; returns the others.
 #[inline(always)]
-fn one<S: Simd>(
+fn some<'a, S: Simd, const COUNT: usize>(
     simd: S,
-    part: usize,
-    z: S::f64s,
-    r: f64,
-    weight: f64,
-    place: &mut Lanes,
-    sum: &mut S::f64s,
+    (half_widths, weights, stand): Plays<'a>,
+    beside: &[Lanes],
+    sums: &mut [Lanes],
+) -> Plays<'a> {
+    let (own, stand) = stand.split_at_mut(COUNT);
+    let (r, half_widths) = half_widths.split_at(COUNT);
+    let (p, weights) = weights.split_at(COUNT);
+    let (r, p): ([S::f64s; COUNT], [S::f64s; COUNT]) = (
+        std::array::from_fn(|i| simd.splat_f64s(r[i])),
+        std::array::from_fn(|i| simd.splat_f64s(p[i])),
+    );
+    for part in 0..LANES / S::F64_LANES {
+        let mut places: [S::f64s; COUNT] =
+            std::array::from_fn(|i| S::as_simd_f64s(&own[i]).0[part]);
+        for (z, sum) in beside.iter().zip(&mut *sums) {
+            let (z, sum) = (S::as_simd_f64s(z).0[part], &mut S::as_mut_simd_f64s(sum).0[part]);
+            // two sums, so that one need not wait for the other
+            let mut second = simd.splat_f64s(0.0);
+            for i in 0..COUNT {
+                let (low, high) = (simd.sub_f64s(z, r[i]), simd.add_f64s(z, r[i]));
+                places[i] = simd.max_f64s(low, simd.min_f64s(high, places[i]));
+                let sum = if i % 2 == 0 { &mut *sum } else { &mut second };
+                *sum = simd.mul_add_e_f64s(p[i], places[i], *sum);
+            }
+            *sum = simd.add_f64s(*sum, second);
+        }
+        for (own, place) in own.iter_mut().zip(places) {
+            S::as_mut_simd_f64s(own).0[part] = place;
+        }
+    }
+    (half_widths, weights, stand)
+}
+
+/// Each sample by the definition.
+pub(super) fn one_by_one(
+    half_widths: &[f64],
+    weights: &[f64],
+    places: &mut [f64],
+    signal: &mut [f64],
 ) {
-    let (r, weight) = (simd.splat_f64s(r), simd.splat_f64s(weight));
-    let (low, high) = (simd.sub_f64s(z, r), simd.add_f64s(z, r));
-    let place = &mut S::as_mut_simd_f64s(place).0[part];
-    *place = simd.max_f64s(low, simd.min_f64s(high, *place));
-    *sum = simd.mul_add_e_f64s(weight, *place, *sum);
+    for value in signal {
+        let z = std::mem::take(value);
+        for ((place, &r), weight) in places.iter_mut().zip(half_widths).zip(weights) {
+            *place = play(r, z, *place);
+            *value += weight * *place;
+        }
+    }
 }

@@ -4,5 +4,6 @@ pub(super) mod bank;
 mod knots;
 mod lanes;
 mod ranked;
+pub(super) mod threads;
 mod turning_points;
 pub(super) mod zones;

@@ -53,7 +53,7 @@ pub(crate) fn in_place(
     previous: &mut f64,
     signal: &mut [f64],
 ) -> bool {
-    if !signal.iter().all(|u| u.is_finite()) {
+    if signal.iter().filter(|u| !u.is_finite()).count() > 0 {
         return false;
     }
     let last = signal.last().copied().unwrap_or(*previous);

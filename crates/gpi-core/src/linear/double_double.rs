@@ -1,0 +1,230 @@
+//! Sums of products in twice the precision: a number is the unevaluated sum of two.
+//!
+//! A sum of products that cancels keeps as many digits as the data have, so that a Gram matrix in this precision
+//! says of a regressor what its orthogonal decomposition says (Dekker 1971; Ogita, Rump and Oishi 2005).
+
+use pulp::{Scalar, Simd};
+
+/// `high + low`, each lane of a vector by itself; |low| is at most half a unit in the last place of high.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DoubleDouble<S: Simd> {
+    pub high: S::f64s,
+    pub low: S::f64s,
+}
+
+/// One number.
+pub(super) type Number = DoubleDouble<Scalar>;
+
+/// `a + b` and what rounding took from it.
+#[inline(always)]
+fn two_sum<S: Simd>(simd: S, a: S::f64s, b: S::f64s) -> (S::f64s, S::f64s) {
+    let sum = simd.add_f64s(a, b);
+    let part = simd.sub_f64s(sum, a);
+    let left = simd.sub_f64s(a, simd.sub_f64s(sum, part));
+    (sum, simd.add_f64s(left, simd.sub_f64s(b, part)))
+}
+
+/// `a b` and what rounding took from it.
+#[inline(always)]
+fn two_product<S: Simd>(simd: S, a: S::f64s, b: S::f64s) -> (S::f64s, S::f64s) {
+    let product = simd.mul_f64s(a, b);
+    (product, simd.mul_add_f64s(a, b, simd.neg_f64s(product)))
+}
+
+impl<S: Simd> DoubleDouble<S> {
+    #[inline(always)]
+    pub(super) fn zero(simd: S) -> Self {
+        Self { high: simd.splat_f64s(0.0), low: simd.splat_f64s(0.0) }
+    }
+
+    /// Brings what has gathered in `low` back to its place.
+    #[inline(always)]
+    fn settled(self, simd: S) -> Self {
+        let high = simd.add_f64s(self.high, self.low);
+        let low = simd.sub_f64s(self.low, simd.sub_f64s(high, self.high));
+        Self { high, low }
+    }
+
+    #[inline(always)]
+    fn plus(self, simd: S, other: Self) -> Self {
+        let (high, rest) = two_sum(simd, self.high, other.high);
+        let low = simd.add_f64s(rest, simd.add_f64s(self.low, other.low));
+        Self { high, low }.settled(simd)
+    }
+
+    #[inline(always)]
+    fn times(self, simd: S, other: Self) -> Self {
+        let (high, rest) = two_product(simd, self.high, other.high);
+        let low = simd.mul_add_f64s(self.low, other.high, rest);
+        let low = simd.mul_add_f64s(self.high, other.low, low);
+        Self { high, low }.settled(simd)
+    }
+
+    /// `self - a b`.
+    #[inline(always)]
+    pub(super) fn minus_product(self, simd: S, a: Self, b: Self) -> Self {
+        let product = a.times(simd, b);
+        let (high, low) = (simd.neg_f64s(product.high), simd.neg_f64s(product.low));
+        self.plus(simd, Self { high, low })
+    }
+}
+
+impl Number {
+    pub(super) const ZERO: Self = Self { high: 0.0, low: 0.0 };
+
+    pub(super) fn value(self) -> f64 {
+        self.high + self.low
+    }
+
+    pub(super) fn sqrt(self) -> Self {
+        let root = Self::from(self.high.sqrt());
+        let rest = self.minus_product(Scalar, root, root);
+        root + Self::from(rest.high / (2.0 * root.high))
+    }
+}
+
+impl From<f64> for Number {
+    fn from(high: f64) -> Self {
+        Self { high, low: 0.0 }
+    }
+}
+
+impl std::ops::Add for Number {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.plus(Scalar, other)
+    }
+}
+
+impl std::ops::AddAssign for Number {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl std::ops::Neg for Number {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self { high: -self.high, low: -self.low }
+    }
+}
+
+impl std::ops::Mul for Number {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.times(Scalar, other)
+    }
+}
+
+impl std::ops::Div for Number {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        let quotient = Self::from(self.high / other.high);
+        let rest = self.minus_product(Scalar, quotient, other);
+        quotient + Self::from(rest.high / other.high)
+    }
+}
+
+/// The product of two numbers, exactly.
+#[inline(always)]
+pub(super) fn product(a: f64, b: f64) -> Number {
+    let (high, low) = two_product(Scalar, a, b);
+    Number { high, low }
+}
+
+/// Samples that one vector of any processor divides.
+pub(super) const WIDTH: usize = 8;
+
+/// Adds `sum_k target[k] source[lags - 1 + k - lag]` to the sum of each lag.
+///
+/// `target` holds a multiple of [`WIDTH`] numbers and `source` `lags - 1` more.
+pub(super) fn lagged_products(target: &[f64], source: &[f64], sums: &mut [Number]) {
+    struct Products<'a>(&'a [f64], &'a [f64], &'a mut [Number]);
+    impl pulp::WithSimd for Products<'_> {
+        type Output = ();
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) {
+            /// Lags whose sums do not wait for each other.
+            const AT_ONCE: usize = 4;
+            let Self(target, source, sums) = self;
+            let mut end = source.len();
+            for sums in sums.chunks_mut(AT_ONCE) {
+                let source = &source[..end];
+                end -= sums.len().min(end);
+                match sums {
+                    [a, b, c, d] => group(simd, target, source, [a, b, c, d]),
+                    [a, b, c] => group(simd, target, source, [a, b, c]),
+                    [a, b] => group(simd, target, source, [a, b]),
+                    [a] => group(simd, target, source, [a]),
+                    _ => {}
+                }
+            }
+        }
+    }
+    debug_assert_eq!(target.len() % WIDTH, 0);
+    debug_assert_eq!(source.len(), target.len() + sums.len() - 1);
+    pulp::Arch::new().dispatch(Products(target, source, sums));
+}
+
+/// The products of some lags that follow each other; the least one ends where `source` ends.
+#[inline(always)]
+fn group<S: Simd, const LAGS: usize>(
+    simd: S,
+    target: &[f64],
+    source: &[f64],
+    sums: [&mut Number; LAGS],
+) {
+    let least = source.len() - target.len();
+    let target = S::as_simd_f64s(target).0;
+    let sources: [&[S::f64s]; LAGS] =
+        std::array::from_fn(|i| &S::as_simd_f64s(&source[least - i..]).0[..target.len()]);
+    let mut parts = [DoubleDouble::<S>::zero(simd); LAGS];
+    for k in 0..target.len() {
+        let negative = simd.neg_f64s(target[k]);
+        for i in 0..LAGS {
+            let high = simd.mul_f64s(target[k], sources[i][k]);
+            let excess = simd.mul_add_f64s(negative, sources[i][k], high);
+            let (sum, rest) = two_sum(simd, parts[i].high, high);
+            parts[i].high = sum;
+            parts[i].low = simd.add_f64s(parts[i].low, simd.sub_f64s(rest, excess));
+        }
+    }
+    for (sum, part) in sums.into_iter().zip(&parts) {
+        let (mut high, mut low) = ([0.0; WIDTH], [0.0; WIDTH]);
+        S::as_mut_simd_f64s(&mut high).0[0] = part.high;
+        S::as_mut_simd_f64s(&mut low).0[0] = part.low;
+        for (high, low) in high.into_iter().zip(low) {
+            *sum += Number { high, low };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cancels_is_not_lost() {
+        let target = [1e16, 1.0, -1e16, 1.0, 0.0, 0.0, 0.0, 0.0];
+        let mut source = vec![0.0; 5];
+        source.extend([1.0; WIDTH]);
+        let mut sums = [Number::ZERO; 6];
+        lagged_products(&target, &source, &mut sums);
+        assert_eq!(sums.map(Number::value), [2.0, 2.0 - 1e16, 1.0 - 1e16, 1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn arithmetic_has_twice_the_digits() {
+        let third = Number::from(1.0) / Number::from(3.0);
+        let one = third + third + third;
+        assert!((one + Number::from(-1.0)).value().abs() < 1e-31);
+        let root = Number::from(2.0).sqrt();
+        assert!((root * root + Number::from(-2.0)).value().abs() < 1e-31);
+        assert_eq!(product(1.0 + 2f64.powi(-52), 1.0 + 2f64.powi(-52)).low, 2f64.powi(-104));
+    }
+}

@@ -1,0 +1,335 @@
+//! Least squares from a Gram matrix in twice the working precision, as good as by an orthogonal decomposition.
+
+use super::decompose::{Svd, singular_values, svd};
+use super::double_double::{DoubleDouble, Number};
+use crate::{Error, Matrix};
+use pulp::{Scalar, Simd};
+
+/// The lower part of `[A y]^T A`, with a regressor A and targets y, and the sum of squares of each target.
+#[derive(Clone, Debug)]
+pub(super) struct Gram {
+    unknowns: usize,
+    rows: usize,
+    /// Columns one after the other; what is above the diagonal is not used.
+    high: Vec<f64>,
+    low: Vec<f64>,
+    /// What the means took from the diagonal.
+    means: Vec<f64>,
+    pub squares: Vec<Number>,
+}
+
+impl Gram {
+    pub(super) fn zeros(unknowns: usize, targets: usize) -> Self {
+        let rows = unknowns + targets;
+        let zeros = vec![0.0; rows * unknowns];
+        Self {
+            unknowns,
+            rows,
+            high: zeros.clone(),
+            low: zeros,
+            means: vec![0.0; unknowns],
+            squares: vec![Number::ZERO; targets],
+        }
+    }
+
+    pub(super) fn add_at(&mut self, row: usize, column: usize, number: Number) {
+        let place = column * self.rows + row;
+        let sum = self.get(row, column) + number;
+        (self.high[place], self.low[place]) = (sum.high, sum.low);
+    }
+
+    fn get(&self, row: usize, column: usize) -> Number {
+        let place = column * self.rows + row;
+        Number { high: self.high[place], low: self.low[place] }
+    }
+
+    pub(super) fn add(&mut self, other: &Self) {
+        for column in 0..self.unknowns {
+            for row in column..self.rows {
+                self.add_at(row, column, other.get(row, column));
+            }
+        }
+        for (mean, other) in self.means.iter_mut().zip(&other.means) {
+            *mean += other;
+        }
+        for (square, other) in self.squares.iter_mut().zip(&other.squares) {
+            *square += *other;
+        }
+    }
+
+    /// Takes the mean out of columns whose sums over so many rows are given, the targets' after the regressor's.
+    pub(super) fn take_means(&mut self, sums: &[Number], count: usize) {
+        let count = Number::from(count as f64);
+        for column in 0..self.unknowns {
+            let mean = -(sums[column] / count);
+            self.means[column] -= (sums[column] * mean).value();
+            for row in column..self.rows {
+                self.add_at(row, column, sums[row] * mean);
+            }
+        }
+        for (square, sum) in self.squares.iter_mut().zip(&sums[self.unknowns..]) {
+            *square += -(*sum * *sum / count);
+        }
+    }
+
+    /// Cholesky's decomposition, the column that the earlier ones explain least of coming next.
+    ///
+    /// Where the mean and the earlier columns make up all that are left to 1e-14 of their length, these get no part of
+    /// their own. Leaving it out moves them by no more than the rounding of an orthogonal decomposition would.
+    pub(super) fn factor(mut self) -> TriangularFactor {
+        struct Decompose<'a>(&'a mut Gram, &'a mut [usize]);
+        impl pulp::WithSimd for Decompose<'_> {
+            type Output = usize;
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, simd: S) -> usize {
+                decompose(simd, self.0, self.1)
+            }
+        }
+        let (n, targets) = (self.unknowns, self.squares.len());
+        let mut order: Vec<usize> = (0..n).collect();
+        let rank = pulp::Arch::new().dispatch(Decompose(&mut self, &mut order));
+        let part = |row: usize, column: usize| {
+            if column < rank { self.get(row, column) } else { Number::ZERO }
+        };
+        let r = Matrix::from_fn(n, n, |i, j| if i <= j { part(j, i).value() } else { 0.0 });
+        let z = Matrix::from_fn(n, targets, |i, target| part(n + target, i).value());
+        let rest = (0..targets).map(|target| {
+            let parts = (0..n).map(|i| part(n + target, i));
+            parts.fold(self.squares[target], |rest, part| rest + -(part * part)).value().max(0.0)
+        });
+        TriangularFactor { rest: rest.collect(), r, z, order }
+    }
+
+    fn swap_elements(&mut self, one: (usize, usize), other: (usize, usize)) {
+        let (one, other) = (one.1 * self.rows + one.0, other.1 * self.rows + other.0);
+        self.high.swap(one, other);
+        self.low.swap(one, other);
+    }
+
+    /// Lets two unknowns, the smaller first, change places.
+    fn exchange(&mut self, one: usize, other: usize) {
+        if one == other {
+            return;
+        }
+        (0..one).for_each(|column| self.swap_elements((one, column), (other, column)));
+        (one + 1..other).for_each(|i| self.swap_elements((i, one), (other, i)));
+        self.swap_elements((one, one), (other, other));
+        (other + 1..self.rows).for_each(|row| self.swap_elements((row, one), (row, other)));
+    }
+}
+
+/// Decomposes in place, by panels of columns that stay in the processor's second cache; returns how many columns have
+/// a part of their own. `order` tells which unknown has come where.
+#[inline(always)]
+fn decompose<S: Simd>(simd: S, gram: &mut Gram, order: &mut [usize]) -> usize {
+    const PANEL: usize = 32;
+    /// Of a column's square that is left when it counts as made up by those before.
+    const DEPENDENT: f64 = 1e-28;
+    let (n, rows) = (gram.unknowns, gram.rows);
+    let mut left: Vec<Number> = (0..n).map(|column| gram.get(column, column)).collect();
+    let mut whole: Vec<f64> =
+        left.iter().zip(&gram.means).map(|(s, mean)| s.value() + mean).collect();
+    for start in (0..n).step_by(PANEL) {
+        let end = n.min(start + PANEL);
+        for column in start..end {
+            let share =
+                |i: &usize| if whole[*i] > 0.0 { left[*i].value() / whole[*i] } else { 0.0 };
+            let next = (column..n).max_by(|i, j| share(i).total_cmp(&share(j)));
+            let Some(next) = next.filter(|next| share(next) > DEPENDENT) else { return column };
+            gram.exchange(column, next);
+            order.swap(column, next);
+            left.swap(column, next);
+            whole.swap(column, next);
+            for earlier in start..column {
+                subtract(simd, gram, column, earlier);
+            }
+            let root = gram.get(column, column).sqrt();
+            for row in column..rows {
+                let part = gram.get(row, column) / root;
+                let place = column * rows + row;
+                (gram.high[place], gram.low[place]) = (part.high, part.low);
+                if row < n {
+                    left[row] += -(part * part);
+                }
+            }
+        }
+        for column in end..n {
+            for earlier in start..end {
+                subtract(simd, gram, column, earlier);
+            }
+        }
+    }
+    n
+}
+
+/// Takes from a column what an earlier one explains of it.
+#[inline(always)]
+fn subtract<S: Simd>(simd: S, gram: &mut Gram, column: usize, earlier: usize) {
+    let rows = gram.rows;
+    let factor = gram.get(column, earlier);
+    let (high, own_high) = gram.high.split_at_mut(column * rows);
+    let (low, own_low) = gram.low.split_at_mut(column * rows);
+    let (high, low) = (&high[earlier * rows..][column..rows], &low[earlier * rows..][column..rows]);
+    let (own_high, own_low) = (&mut own_high[column..rows], &mut own_low[column..rows]);
+    let (high, high_rest) = S::as_simd_f64s(high);
+    let (low, low_rest) = S::as_simd_f64s(low);
+    let (own_high, own_high_rest) = S::as_mut_simd_f64s(own_high);
+    let (own_low, own_low_rest) = S::as_mut_simd_f64s(own_low);
+    let vector =
+        DoubleDouble { high: simd.splat_f64s(factor.high), low: simd.splat_f64s(factor.low) };
+    let parts = high.iter().zip(low).zip(own_high.iter_mut().zip(own_low));
+    for ((&high, &low), (own_high, own_low)) in parts {
+        let own = DoubleDouble { high: *own_high, low: *own_low };
+        let left = own.minus_product(simd, vector, DoubleDouble { high, low });
+        (*own_high, *own_low) = (left.high, left.low);
+    }
+    let parts = high_rest.iter().zip(low_rest).zip(own_high_rest.iter_mut().zip(own_low_rest));
+    for ((&high, &low), (own_high, own_low)) in parts {
+        let own = Number { high: *own_high, low: *own_low };
+        let left = own.minus_product(Scalar, factor, Number { high, low });
+        (*own_high, *own_low) = (left.high, left.low);
+    }
+}
+
+/// `A P = Q r`, `z = Q^T y`, and the sum of squares of each target that no unknown explains.
+pub(super) struct TriangularFactor {
+    r: Matrix,
+    z: Matrix,
+    rest: Vec<f64>,
+    /// Which unknown each column of r belongs to.
+    order: Vec<usize>,
+}
+
+/// The minimum-norm solution and what its trustworthiness rests on.
+pub(super) struct Solution {
+    /// (unknowns, targets).
+    pub x: Matrix,
+    /// Singular values of the regressor, descending.
+    pub singular_values: Vec<f64>,
+    /// How many of them exceed the tolerance times the largest.
+    pub rank: usize,
+    /// Sum of squared residuals of each target.
+    pub residual_squares: Vec<f64>,
+}
+
+impl TriangularFactor {
+    /// The minimum-norm solution over the directions whose singular value exceeds `tolerance` times the largest.
+    ///
+    /// `ridge`, relative to the mean eigenvalue, regularizes by three passes of iterated ridge regression, which
+    /// hardly biases what is well excited.
+    pub(super) fn solve(&self, tolerance: f64, ridge: f64) -> Result<Solution, Error> {
+        let rank = |s: &[f64]| s.iter().take_while(|&&value| value > tolerance * s[0]).count();
+        if ridge == 0.0 {
+            let s = self.singular_values()?;
+            let is_whole = rank(&s) == s.len();
+            if let Some(x) = self.r.solve_upper_triangular(&self.z).filter(|_| is_whole) {
+                return Ok(self.solution(x, s.len(), s));
+            }
+        }
+        let Svd { u, s, v } = svd(&self.r)?;
+        let rank = rank(&s);
+        let mut projected = u.columns(0, rank).tr_mul(&self.z);
+        let penalty = ridge * s.iter().map(|value| value * value).sum::<f64>() / s.len() as f64;
+        for (mut row, value) in projected.row_iter_mut().zip(&s) {
+            row *= (1.0 - (penalty / (penalty + value * value)).powi(3)) / value;
+        }
+        Ok(self.solution(v.columns(0, rank) * projected, rank, s))
+    }
+
+    /// From the unknowns in the order of r's columns.
+    fn solution(&self, ordered: Matrix, rank: usize, singular_values: Vec<f64>) -> Solution {
+        let left = &self.z - &self.r * &ordered;
+        let squares = self.rest.iter().zip(left.column_iter());
+        let residual_squares = squares.map(|(rest, left)| rest + left.norm_squared()).collect();
+        let mut x = ordered.clone();
+        for (row, &unknown) in ordered.row_iter().zip(&self.order) {
+            x.row_mut(unknown).copy_from(&row);
+        }
+        Solution { x, singular_values, rank, residual_squares }
+    }
+
+    /// The singular values of the regressor, descending.
+    pub(super) fn singular_values(&self) -> Result<Vec<f64>, Error> {
+        singular_values(&self.r)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factor(regressor: &Matrix, target: &Matrix) -> TriangularFactor {
+        let (n, product) = (regressor.ncols(), super::super::double_double::product);
+        let mut gram = Gram::zeros(n, 1);
+        for (row, y) in regressor.row_iter().zip(target.iter()) {
+            for j in 0..n {
+                (j..n).for_each(|i| gram.add_at(i, j, product(row[i], row[j])));
+                gram.add_at(n, j, product(*y, row[j]));
+            }
+            gram.squares[0] += product(*y, *y);
+        }
+        gram.factor()
+    }
+
+    #[test]
+    fn minimum_norm_on_a_deficient_regressor() {
+        let found = factor(&Matrix::from_element(3, 2, 1.0), &Matrix::from_element(3, 1, 4.0));
+        let solution = found.solve(1e-6, 0.0).unwrap();
+        assert_eq!(solution.rank, 1);
+        assert!((solution.x[0] - 2.0).abs() < 1e-14 && (solution.x[1] - 2.0).abs() < 1e-14);
+        assert!(solution.residual_squares[0] < 1e-28);
+    }
+
+    /// More columns than a panel holds, of a condition whose square working precision does not hold.
+    #[test]
+    fn it_solves_as_an_orthogonal_decomposition_does() {
+        let n = 45;
+        let a = Matrix::from_fn(120, n, |i, j| {
+            ((i * (j + 3)) as f64 * 0.37).sin() + 1e6 * (i as f64 * 0.1).cos() / (1.0 + j as f64)
+        });
+        let y = Matrix::from_fn(120, 1, |i, _| (i as f64).sqrt());
+        let solution = factor(&a, &y).solve(1e-13, 0.0).unwrap();
+        assert_eq!(solution.rank, n);
+        let whole = svd(&a).unwrap();
+        assert!(whole.s[0] / whole.s[n - 1] > 1e8);
+        for (found, expected) in solution.singular_values.iter().zip(&whole.s) {
+            assert!((found - expected).abs() < 1e-13 * whole.s[0]);
+        }
+        let qr = a.clone().qr();
+        let x = qr.r().solve_upper_triangular(&qr.q().tr_mul(&y)).unwrap();
+        assert!((&a * (&solution.x - x)).norm() < 1e-8 * y.norm());
+        let residual = (&y - &a * &solution.x).norm_squared();
+        assert!((solution.residual_squares[0] / residual - 1.0).abs() < 1e-8);
+    }
+
+    /// Narrow-band input: each column is nearly made up by the others, and in all they have few directions.
+    #[test]
+    fn few_directions_among_many_columns() {
+        let n = 200;
+        let tone =
+            |k: f64| (0..12).map(|m| (0.02 * f64::from(m) * k + f64::from(m)).cos()).sum::<f64>();
+        let a = Matrix::from_fn(600, n, |i, j| tone(i as f64 - j as f64));
+        let y = Matrix::from_fn(600, 1, |i, _| 3.0 * a[(i, 4)] - a[(i, 150)]);
+        let solution = factor(&a, &y).solve(1e-13, 0.0).unwrap();
+        let whole = svd(&a).unwrap();
+        for (found, expected) in solution.singular_values.iter().zip(&whole.s) {
+            assert!((found - expected).abs() < 1e-13 * whole.s[0], "{found} {expected}");
+        }
+        assert!(solution.rank <= 30, "{}", solution.rank);
+        assert!((&a * &solution.x - &y).norm() < 1e-10 * y.norm());
+    }
+
+    #[test]
+    fn what_other_columns_make_up_has_no_part_of_its_own() {
+        let a = Matrix::from_fn(20, 3, |i, j| match j {
+            0 => (i as f64 * 0.3).sin(),
+            1 => (i as f64 * 0.3).sin() * 0.1,
+            _ => (i as f64 * 0.7).cos(),
+        });
+        let found = factor(&a, &Matrix::from_fn(20, 1, |i, _| 2.0 * a[(i, 2)]));
+        assert_eq!(found.r.row(2).amax(), 0.0);
+        let solution = found.solve(1e-13, 0.0).unwrap();
+        assert_eq!(solution.rank, 2);
+        assert!((solution.x[2] - 2.0).abs() < 1e-13);
+    }
+}
