@@ -150,3 +150,22 @@ fn infinite_samples_are_what_the_definition_makes_of_them() {
     input[2000] = f64::INFINITY;
     check(&bank, vec![0.0; 3], &input, 300);
 }
+
+/// Minor loops in minor loops, each slow enough for runs of samples, which many plays begin to move within.
+#[test]
+fn smooth_loops_within_loops() {
+    for speed in [1e-3, 1e-2, 5e-2, 0.2] {
+        let value = |k: u32| {
+            let k = f64::from(k);
+            (speed * k).sin() + 0.5 * (3.3 * speed * k).sin() + 0.2 * (0.11 * speed * k).cos()
+        };
+        let input: Vec<f64> = (0..20_000).map(value).collect();
+        for plays in [2, 9, 40, 300, 1024] {
+            let r: Vec<f64> =
+                (0..plays).map(|i| 1.2 * f64::from(i / 2) / f64::from(plays)).collect();
+            let p = (0..plays).map(|i| if i % 5 < 2 { -0.3 } else { 1.0 }).collect();
+            let start = r.iter().map(|r| 0.9 * r).collect();
+            check(&PlayBank::new(r, p).unwrap(), start, &input, 9_000);
+        }
+    }
+}

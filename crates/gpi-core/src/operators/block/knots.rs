@@ -14,8 +14,8 @@ struct Bucket {
     /// Infinite where it holds none.
     first: f64,
     /// How many are in earlier buckets.
-    before: usize,
-    count: usize,
+    before: u32,
+    count: u32,
 }
 
 impl Knots {
@@ -56,10 +56,12 @@ impl Knots {
     #[inline(always)]
     pub(super) fn at_most(&self, x: f64) -> usize {
         let Bucket { first, before, count } = self.buckets[self.bucket(x)];
+        let before = before as usize;
         if count <= 1 {
             return before + usize::from(first <= x);
         }
-        before + self.values[before..before + count].partition_point(|&value| value <= x)
+        let own = &self.values[before..before + count as usize];
+        before + own.partition_point(|&value| value <= x)
     }
 }
 

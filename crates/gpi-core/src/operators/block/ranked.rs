@@ -12,6 +12,8 @@ pub(super) struct Ranked {
     pub weights: Vec<f64>,
     /// Sums of p r over the first so many plays.
     pub moments: Vec<f64>,
+    /// Both, side by side.
+    lines: Vec<(f64, f64)>,
     knots: Knots,
 }
 
@@ -20,9 +22,12 @@ impl Ranked {
         let mut order: Vec<usize> = (0..half_widths.len()).collect();
         order.sort_by(|&i, &j| half_widths[i].total_cmp(&half_widths[j]));
         let sorted: Vec<f64> = order.iter().map(|&i| half_widths[i]).collect();
+        let moments = sums(order.iter().map(|&i| weights[i] * half_widths[i]));
+        let weights = sums(order.iter().map(|&i| weights[i]));
         Self {
-            weights: sums(order.iter().map(|&i| weights[i])),
-            moments: sums(order.iter().map(|&i| weights[i] * half_widths[i])),
+            lines: weights.iter().copied().zip(moments.iter().copied()).collect(),
+            weights,
+            moments,
             knots: Knots::new(sorted.clone()),
             half_widths: sorted,
             order,
@@ -37,6 +42,13 @@ impl Ranked {
     #[inline(always)]
     pub(super) fn at_most(&self, x: f64) -> usize {
         self.knots.at_most(x)
+    }
+
+    /// `sum_i p_i max(x - r_i, 0)`.
+    #[inline(always)]
+    pub(super) fn beyond(&self, x: f64) -> f64 {
+        let (weights, moments) = self.lines[self.at_most(x)];
+        weights * x - moments
     }
 }
 

@@ -185,6 +185,35 @@ impl<'a> TurningPoints<'a> {
         self.look_ahead();
     }
 
+    /// The `sign * z` from which on more plays move than those of the latest earlier branch.
+    #[inline(always)]
+    fn farthest(&self) -> f64 {
+        match self.turns.last() {
+            Some(turn) if turn.sign != self.sign => {
+                self.sign * turn.z + 2.0 * self.bank.half_widths[turn.end - 1]
+            }
+            _ => self.limit,
+        }
+    }
+
+    /// The outputs of samples that go on over where more and more plays of the latest earlier branch move: with that
+    /// branch's end at z_t and s the sign, `v = v_t + 2 s sum_i p_i max(|z - z_t| / 2 - r_i, 0)`.
+    #[inline(always)]
+    fn curve(&mut self, now: &[f64; RUN], out: &mut [f64; RUN]) {
+        let Some(turn) = self.turns.last() else { return };
+        let (start, half) = (turn.z, 0.5 * self.sign);
+        let (weights, moments) = (&self.bank.weights, &self.bank.moments);
+        let begin = weights[turn.end] * start + self.sign * moments[turn.end] + turn.rest;
+        for (z, v) in now.iter().zip(&mut *out) {
+            *v = begin + 2.0 * self.sign * self.bank.beyond(half * (z - start));
+        }
+        self.last = now[RUN - 1];
+        let met = self.bank.at_most(half * (self.last - start));
+        self.moving = self.moving.max(met).min(turn.end - 1);
+        self.look_ahead();
+        self.settle();
+    }
+
     /// The outputs of finite samples.
     #[inline(always)]
     pub(super) fn run<S: Simd>(&mut self, simd: S, input: &[f64], output: &mut [f64]) {
@@ -205,12 +234,16 @@ impl<'a> TurningPoints<'a> {
                 input[k..].first_chunk::<RUN>(),
                 output[k..].first_chunk_mut::<RUN>(),
             ) {
-                let ends_before = self.sign * now[RUN - 1] < self.limit;
-                if !ends_before || !goes_on(simd, passed, now, self.sign) {
+                let end = self.sign * now[RUN - 1];
+                if end >= self.farthest() || !goes_on(simd, passed, now, self.sign) {
                     break;
                 }
-                line(simd, now, self.slope, self.constant, out);
-                self.last = now[RUN - 1];
+                if end < self.limit {
+                    line(simd, now, self.slope, self.constant, out);
+                    self.last = now[RUN - 1];
+                } else {
+                    self.curve(now, out);
+                }
                 k += RUN;
             }
         }
