@@ -35,11 +35,12 @@ HEADER = """# Benchmarks
 
 Made by `make bench-peers` on {machine}.
 
-Called from Python on NumPy arrays, on one thread where no other number is named; the C loop is compiled
-with `-O3`. Columns from `copy` on are the peer's time over ours, medians of rounds in which each runs once:
-above 1 we are faster. `copy` is NumPy's copy of the input into new memory, the least that any of them does.
-NumPy's part of `FIR` is `lstsq`, of `ERA` the singular value decomposition alone, of which `order 6` needs
-the leading values and the other all.
+Called from Python on NumPy arrays; all run on one thread, but for rows that name two here and for NumPy's
+`lstsq` and decompositions, which take as many as they like. The C loop is compiled with `-O3`. Columns from
+`copy` on are the peer's time over ours, medians of rounds in which each runs once: above 1 we are faster.
+`copy` is NumPy's copy of the input into new memory, the least that any of them does. NumPy's part of `FIR`
+is `lstsq`, of `ERA` the singular value decomposition alone, of which `order 6` needs the leading values and
+the other all.
 
 """
 

@@ -29,8 +29,9 @@ use pyo3::prelude::*;
 /// Returns
 /// -------
 /// StateSpace
-///     Balanced, with all singular values, and with the number of unstable poles that were reflected
-///     into the unit circle.
+///     Balanced, with the singular values (all, or as many as the order where that is given, at most 12,
+///     and enough for a matrix of 100 rows or more), and with the number of unstable poles that were
+///     reflected into the unit circle.
 ///
 /// Raises
 /// ------
@@ -215,7 +216,8 @@ impl StateSpace {
         Ok(from_matrix(py, &self.system.dc_gain().map_err(to_python)?))
     }
 
-    /// All singular values of ERA's Hankel matrix, descending; None for a model from elsewhere.
+    /// Singular values of ERA's Hankel matrix, descending, all or the leading ones (see ``era``); None for a
+    /// model from elsewhere.
     #[getter]
     fn singular_values<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyAny>> {
         self.singular_values.as_ref().map(|values| from_vector(py, values))
