@@ -1,4 +1,4 @@
-//! Play banks, deadzones and the cascade: samples per second, on smooth input and on noise.
+//! Play banks, deadzones, the cascade and its inverse: samples per second, on smooth input and on noise.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use gpi_core::operators::{Deadzones, Gpi, Operator, PlayBank, Reading};
@@ -62,6 +62,47 @@ fn blocks(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// Records that do not fit into any cache: copying them is all that the memory allows.
+fn long(criterion: &mut Criterion) {
+    const SAMPLES: usize = 10_000_000;
+    let input: Vec<f64> = (0..SAMPLES).map(|k| (k as f64 * 0.006).sin()).collect();
+    let mut output = vec![0.0; SAMPLES];
+    let mut group = criterion.benchmark_group("long and smooth");
+    group.throughput(Throughput::Elements(SAMPLES as u64)).sample_size(10);
+    group.bench_function("memcpy", |bencher| {
+        bencher.iter(|| black_box(&mut output).copy_from_slice(black_box(&input)));
+    });
+    for plays in [8, 32] {
+        let bank = bank(plays);
+        group.bench_function(BenchmarkId::new("plays", plays), |bencher| {
+            let mut state = bank.rest();
+            bencher.iter(|| bank.block(&mut state, black_box(&input), &mut output));
+        });
+    }
+    group.finish();
+}
+
+/// The inverse next to what it undoes.
+fn inverse(criterion: &mut Criterion) {
+    let zones = Deadzones::new(vec![-0.5, 0.0, 0.5], vec![0.2, 1.0, 0.3], Reading::OneSided);
+    let gpi = Gpi::new(zones.expect("valid"), bank(32));
+    let undo = gpi.inverse().expect("all slopes are positive");
+    let mut group = criterion.benchmark_group("cascade");
+    group.throughput(Throughput::Elements(SAMPLES as u64));
+    let mut output = vec![0.0; SAMPLES];
+    for (name, input) in [("smooth", smooth()), ("noise", noise())] {
+        group.bench_function(BenchmarkId::new("forward", name), |bencher| {
+            let mut state = gpi.rest();
+            bencher.iter(|| gpi.block(&mut state, black_box(&input), &mut output));
+        });
+        group.bench_function(BenchmarkId::new("inverse", name), |bencher| {
+            let mut state = undo.rest();
+            bencher.iter(|| undo.block(&mut state, black_box(&input), &mut output));
+        });
+    }
+    group.finish();
+}
+
 fn streaming(criterion: &mut Criterion) {
     let plays = PlayBank::new([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7], [1.0; 8]);
     let zones = Deadzones::new(
@@ -84,5 +125,5 @@ fn streaming(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, blocks, streaming);
+criterion_group!(benches, blocks, long, inverse, streaming);
 criterion_main!(benches);

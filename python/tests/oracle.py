@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg
+import scipy.optimize
 
 EXCITATION_TOLERANCE = 1e-13
 
@@ -82,6 +83,26 @@ def gpi(u, thresholds, deadzone_weights, half_widths, weights, reading="one-side
     """P[D[u]], equation (1), and the plays' state after the last sample."""
     z = deadzones(u, thresholds, deadzone_weights, reading, previous)
     return play_bank(z, half_widths, weights, start)
+
+
+def inverse_gpi(v, thresholds, deadzone_weights, half_widths, weights, start=None, limits=(-1e3, 1e3)):
+    """The drive u that makes `gpi` give v, sample by sample, or the nearer limit."""
+    start = np.zeros(len(half_widths)) if start is None else start
+    u = np.empty(len(v))
+    for k, wanted in enumerate(v):
+
+        def missing(value, start=start, wanted=wanted):
+            v, _ = gpi([value], thresholds, deadzone_weights, half_widths, weights, start=start)
+            return v[0] - wanted
+
+        if missing(limits[0]) > 0:
+            u[k] = limits[0]
+        elif missing(limits[1]) < 0:
+            u[k] = limits[1]
+        else:
+            u[k] = scipy.optimize.brentq(missing, *limits, xtol=1e-14, rtol=1e-15)
+        _, start = gpi([u[k]], thresholds, deadzone_weights, half_widths, weights, start=start)
+    return u
 
 
 def loop_area(u, v):

@@ -287,9 +287,12 @@ impl Experiment {
 
 fn require_finite(matrix: &Matrix, channels: &[Channel]) -> Result<(), Error> {
     for (values, channel) in matrix.column_iter().zip(channels) {
-        let mut rows = values.iter().enumerate().filter(|(_, value)| !value.is_finite());
-        if let Some((row, _)) = rows.next() {
-            let (column, count) = (channel.name.clone(), 1 + rows.count());
+        // counted first: a search would look at one sample after the other
+        let count = values.iter().filter(|value| !value.is_finite()).count();
+        if count > 0
+            && let Some(row) = values.iter().position(|value| !value.is_finite())
+        {
+            let column = channel.name.clone();
             return Err(Error::NotFinite { column, row, count });
         }
     }

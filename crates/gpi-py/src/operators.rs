@@ -1,9 +1,11 @@
 //! Deadzones, plays and their cascade.
 
-use crate::arrays::{self, from_owned, from_signal, from_vector, vector, with_columns};
+use crate::arrays::{self, empty_signal, from_signal, from_vector, vector, with_columns};
 use crate::errors::{parameter, to_python};
+use crate::inverse_hysteresis::{self, InverseGpi};
 use gpi_core::operators::{self, DeadzonesState, GpiState, Operator, Reading};
 use gpi_core::{Hysteresis, Matrix};
+use numpy::PyArrayMethods;
 use pyo3::prelude::*;
 
 type Bank = operators::PlayBank<Vec<f64>>;
@@ -102,6 +104,24 @@ impl PlayBank {
         })
     }
 
+    /// The bank that undoes this one, its plays from narrow to wide (Kuhnen 2003).
+    ///
+    /// With P_i = p_0 + .. + p_i: half-widths ``r'_i = sum_{j<=i} p_j (r_i - r_j)``, weights ``p'_0 = 1/P_0`` and
+    /// ``p'_i = 1/P_i - 1/P_{i-1}``.
+    ///
+    /// Returns
+    /// -------
+    /// PlayBank
+    ///     From v to z.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     A slope P_i that is not positive; without a play of half-width zero the first one is zero.
+    fn inverse(&self) -> PyResult<Self> {
+        Ok(Self { bank: self.bank.inverse().map_err(to_python)? })
+    }
+
     fn __repr__(&self) -> String {
         format!("PlayBank({} plays, weights sum to {})", self.bank.weights().len(), sum(&self.bank))
     }
@@ -109,7 +129,7 @@ impl PlayBank {
 
 /// Runs each channel of a signal from its own state, all from zeros where none is given; `run` returns the state after
 /// the last sample. States hold so many numbers.
-fn channels<'py, S: Send + Sync>(
+pub(crate) fn channels<'py, S: Send + Sync>(
     signal: &Bound<'py, PyAny>,
     (name, length): (&str, usize),
     state: Option<&Bound<'py, PyAny>>,
@@ -128,7 +148,10 @@ fn channels<'py, S: Send + Sync>(
             return Err(parameter(message));
         }
         let states: PyResult<Vec<S>> = begin.column_iter().map(|c| read(c.as_slice())).collect();
-        let (mut states, mut output) = (states?, vec![0.0; samples * count]);
+        let mut states = states?;
+        let array = empty_signal(py, (samples, count), one_dimensional)?;
+        let mut writing = array.try_readwrite()?;
+        let output = writing.as_slice_mut()?;
         let after: Vec<f64> = py.detach(|| {
             let columns = states.iter_mut().enumerate().map(|(channel, state)| {
                 let own = channel * samples..(channel + 1) * samples;
@@ -136,9 +159,9 @@ fn channels<'py, S: Send + Sync>(
             });
             columns.flatten().collect()
         });
-        let values = Matrix::from_vec(samples, count, output);
+        drop(writing);
         let after = Matrix::from_vec(length, count, after);
-        Ok((from_signal(py, values, one_dimensional), from_signal(py, after, one_dimensional)))
+        Ok((array.into_any(), from_signal(py, after, one_dimensional)))
     })
 }
 
@@ -245,10 +268,20 @@ impl Deadzones {
         u: &Bound<'py, PyAny>,
         previous: Option<f64>,
     ) -> PyResult<(Bound<'py, PyAny>, f64)> {
-        let mut state = DeadzonesState { previous: previous.unwrap_or(0.0) };
-        let mut signal = vector("u", u)?;
-        u.py().detach(|| self.envelope.in_place(&mut state, &mut signal));
-        Ok((from_owned(u.py(), signal), state.previous))
+        let (py, mut state) = (u.py(), DeadzonesState { previous: previous.unwrap_or(0.0) });
+        with_columns("u", u, |input, (samples, channels), one_dimensional| {
+            if !one_dimensional {
+                let message =
+                    format!("`u` has shape ({samples}, {channels}); (samples,) is needed");
+                return Err(parameter(message));
+            }
+            let array = empty_signal(py, (samples, 1), true)?;
+            let mut writing = array.try_readwrite()?;
+            let output = writing.as_slice_mut()?;
+            py.detach(|| self.envelope.block(&mut state, input, output));
+            drop(writing);
+            Ok((array.into_any(), state.previous))
+        })
     }
 
     fn __repr__(&self) -> String {
@@ -327,6 +360,52 @@ impl Gpi {
             hysteresis.block(state, input, output);
             write_state(state)
         })
+    }
+
+    /// The exact inverse, from v to u, as far around zero as the envelope rises.
+    ///
+    /// Parameters
+    /// ----------
+    /// limits : tuple of float, optional
+    ///     The lowest and the highest drive, in the unit of u; what they do not reach is clamped.
+    ///
+    /// Returns
+    /// -------
+    /// InverseGpi
+    ///     ``op(op.inverse()(v))`` is v.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     A slope of the plays, or of the envelope at zero, that is not positive; directional deadzones; limits between
+    ///     which the envelope does not rise.
+    #[pyo3(signature = (*, limits = None))]
+    fn inverse(&self, limits: Option<(f64, f64)>) -> PyResult<InverseGpi> {
+        let (lower, upper) = limits.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        let inverse = self.hysteresis.inverse_within(lower, upper).map_err(to_python)?;
+        Ok(InverseGpi::new(inverse))
+    }
+
+    /// The state of the inverse that belongs to a state of this cascade.
+    ///
+    /// Parameters
+    /// ----------
+    /// state : array_like, shape (1 + n,)
+    ///     What [`Gpi.run`] returned.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (1 + n,)
+    ///     For [`InverseGpi.run`]: no sample out of reach yet, then where its plays stand, in the unit of v.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     Plays further apart than their half-widths allow, which no input brings about.
+    fn inverse_state<'py>(&self, state: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let forward = read_state(&self.hysteresis, &vector("state", state)?)?;
+        let own = self.hysteresis.inverse_state(&forward).map_err(to_python)?;
+        Ok(from_vector(state.py(), &inverse_hysteresis::write(&own)))
     }
 
     fn __repr__(&self) -> String {

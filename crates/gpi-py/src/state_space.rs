@@ -5,7 +5,7 @@ use crate::arrays::{
     vector,
 };
 use crate::errors::{parameter, to_python};
-use crate::inverse::NoncausalFir;
+use crate::noncausal_fir::NoncausalFir;
 use crate::plotting::plot;
 use gpi_core::linear::{self, EraOptions, InverseOptions, TransferFunction};
 use nalgebra::DVector;

@@ -32,11 +32,6 @@ fn two_product<S: Simd>(simd: S, a: S::f64s, b: S::f64s) -> (S::f64s, S::f64s) {
 }
 
 impl<S: Simd> DoubleDouble<S> {
-    #[inline(always)]
-    pub(super) fn zero(simd: S) -> Self {
-        Self { high: simd.splat_f64s(0.0), low: simd.splat_f64s(0.0) }
-    }
-
     /// Brings what has gathered in `low` back to its place.
     #[inline(always)]
     fn settled(self, simd: S) -> Self {
@@ -152,15 +147,19 @@ pub(super) fn lagged_products(target: &[f64], source: &[f64], sums: &mut [Number
             /// Lags whose sums do not wait for each other.
             const AT_ONCE: usize = 4;
             let Self(target, source, sums) = self;
+            let largest = largest(simd, target) * largest(simd, source);
+            if largest == 0.0 {
+                return;
+            }
             let mut end = source.len();
             for sums in sums.chunks_mut(AT_ONCE) {
                 let source = &source[..end];
                 end -= sums.len().min(end);
                 match sums {
-                    [a, b, c, d] => group(simd, target, source, [a, b, c, d]),
-                    [a, b, c] => group(simd, target, source, [a, b, c]),
-                    [a, b] => group(simd, target, source, [a, b]),
-                    [a] => group(simd, target, source, [a]),
+                    [a, b, c, d] => group(simd, target, source, largest, [a, b, c, d]),
+                    [a, b, c] => group(simd, target, source, largest, [a, b, c]),
+                    [a, b] => group(simd, target, source, largest, [a, b]),
+                    [a] => group(simd, target, source, largest, [a]),
                     _ => {}
                 }
             }
@@ -171,35 +170,54 @@ pub(super) fn lagged_products(target: &[f64], source: &[f64], sums: &mut [Number
     pulp::Arch::new().dispatch(Products(target, source, sums));
 }
 
+/// The largest absolute value.
+#[inline(always)]
+fn largest<S: Simd>(simd: S, values: &[f64]) -> f64 {
+    let (vectors, rest) = S::as_simd_f64s(values);
+    let mut sides = [simd.splat_f64s(0.0); 4];
+    for vectors in vectors.chunks(sides.len()) {
+        for (side, &vector) in sides.iter_mut().zip(vectors) {
+            *side = simd.max_f64s(*side, simd.abs_f64s(vector));
+        }
+    }
+    let most = sides.map(|side| simd.reduce_max_f64s(side));
+    most.into_iter().chain(rest.iter().map(|value| value.abs())).fold(0.0, f64::max)
+}
+
 /// The products of some lags that follow each other; the least one ends where `source` ends.
+///
+/// A sum begins at a number so large that every product rounds to the same grid: what it grows by is then exact, and
+/// what rounding left of the product too (Zielke and Drygalla 2003; Rump, Ogita and Oishi 2008).
 #[inline(always)]
 fn group<S: Simd, const LAGS: usize>(
     simd: S,
     target: &[f64],
     source: &[f64],
+    largest: f64,
     sums: [&mut Number; LAGS],
 ) {
     let least = source.len() - target.len();
     let target = S::as_simd_f64s(target).0;
     let sources: [&[S::f64s]; LAGS] =
         std::array::from_fn(|i| &S::as_simd_f64s(&source[least - i..]).0[..target.len()]);
-    let mut parts = [DoubleDouble::<S>::zero(simd); LAGS];
+    let begin = 1.5 * (2.0 * largest * target.len() as f64).log2().ceil().exp2();
+    let mut parts =
+        [DoubleDouble::<S> { high: simd.splat_f64s(begin), low: simd.splat_f64s(0.0) }; LAGS];
     for k in 0..target.len() {
-        let negative = simd.neg_f64s(target[k]);
         for i in 0..LAGS {
-            let high = simd.mul_f64s(target[k], sources[i][k]);
-            let excess = simd.mul_add_f64s(negative, sources[i][k], high);
-            let (sum, rest) = two_sum(simd, parts[i].high, high);
+            let sum = simd.mul_add_f64s(target[k], sources[i][k], parts[i].high);
+            let negative = simd.sub_f64s(parts[i].high, sum);
+            let rest = simd.mul_add_f64s(target[k], sources[i][k], negative);
             parts[i].high = sum;
-            parts[i].low = simd.add_f64s(parts[i].low, simd.sub_f64s(rest, excess));
+            parts[i].low = simd.add_f64s(parts[i].low, rest);
         }
     }
     for (sum, part) in sums.into_iter().zip(&parts) {
-        let (mut high, mut low) = ([0.0; WIDTH], [0.0; WIDTH]);
+        let (mut high, mut low) = ([begin; WIDTH], [0.0; WIDTH]);
         S::as_mut_simd_f64s(&mut high).0[0] = part.high;
         S::as_mut_simd_f64s(&mut low).0[0] = part.low;
         for (high, low) in high.into_iter().zip(low) {
-            *sum += Number { high, low };
+            *sum += Number { high: high - begin, low };
         }
     }
 }

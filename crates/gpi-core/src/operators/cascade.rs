@@ -1,6 +1,6 @@
 //! The generalized Prandtl-Ishlinskii operator: deadzones, then plays.
 
-use super::{Deadzones, DeadzonesState, Operator, PlayBank, PlayBankState, Storage};
+use super::{Deadzones, DeadzonesState, IN_CACHE, Operator, PlayBank, PlayBankState, Storage};
 
 /// The cascade `v = P[D[u]]`, equation (1) of the paper.
 ///
@@ -78,14 +78,18 @@ where
     }
 
     fn block(&self, state: &mut Self::State, input: &[E::Item], output: &mut [E::Item]) -> usize {
-        let samples = self.envelope.block(&mut state.envelope, input, output);
-        self.plays.in_place(&mut state.plays, &mut output[..samples]);
-        samples
+        for (output, input) in output.chunks_mut(IN_CACHE).zip(input.chunks(IN_CACHE)) {
+            let samples = self.envelope.block(&mut state.envelope, input, output);
+            self.plays.in_place(&mut state.plays, &mut output[..samples]);
+        }
+        input.len().min(output.len())
     }
 
     fn in_place(&self, state: &mut Self::State, signal: &mut [E::Item]) {
-        self.envelope.in_place(&mut state.envelope, signal);
-        self.plays.in_place(&mut state.plays, signal);
+        for signal in signal.chunks_mut(IN_CACHE) {
+            self.envelope.in_place(&mut state.envelope, signal);
+            self.plays.in_place(&mut state.plays, signal);
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::error::{require_finite, require_length};
 use super::storage::sum;
-use super::{Operator, OperatorError, Sample, Storage};
+use super::{IN_CACHE, Operator, OperatorError, Sample, Storage};
 
 /// How the deadzone Z_eta is read; the paper's text and its equation (3) disagree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,8 +77,8 @@ impl Reading {
     ))
 )]
 pub struct Deadzones<S> {
-    thresholds: S,
-    weights: S,
+    pub(super) thresholds: S,
+    pub(super) weights: S,
     reading: Reading,
     /// The one-sided deadzone of each threshold is `u - clamp(u, lower, upper)`: which side it leaves out is known
     /// beforehand, so that no sample has to ask.
@@ -194,10 +194,12 @@ impl<S: Storage> Operator for Deadzones<S> {
         input: &[S::Item],
         output: &mut [S::Item],
     ) -> usize {
-        let samples = input.len().min(output.len());
-        output[..samples].copy_from_slice(&input[..samples]);
-        self.in_place(state, &mut output[..samples]);
-        samples
+        for (output, input) in output.chunks_mut(IN_CACHE).zip(input.chunks(IN_CACHE)) {
+            let samples = input.len().min(output.len());
+            output[..samples].copy_from_slice(&input[..samples]);
+            self.in_place(state, &mut output[..samples]);
+        }
+        input.len().min(output.len())
     }
 
     /// On a host all deadzones are one piecewise linear curve to a long record, whose cost hardly grows with their

@@ -9,14 +9,20 @@ mod block;
 mod cascade;
 mod deadzones;
 mod error;
+mod inverse;
 mod plays;
 mod storage;
 
 pub use cascade::{Gpi, GpiState};
 pub use deadzones::{Deadzones, DeadzonesState, Reading};
 pub use error::OperatorError;
+pub use inverse::{InverseGpi, InverseState};
 pub use plays::{PlayBank, PlayBankState, play};
 pub use storage::{Sample, Storage};
+
+/// Samples that go through one operator after the other at once: `f64` in and out stay in the processor's second
+/// cache. An eighth of them is no power of two, whose multiples would all go to one place of the first cache.
+pub(crate) const IN_CACHE: usize = 32_704;
 
 /// A causal map from one sample to one sample, with its memory held by the caller.
 ///

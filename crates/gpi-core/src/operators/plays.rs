@@ -38,15 +38,15 @@ pub fn play<T: Sample>(half_width: T, input: T, previous: T) -> T {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
 pub struct PlayBank<S> {
-    half_widths: S,
-    weights: S,
+    pub(super) half_widths: S,
+    pub(super) weights: S,
 }
 
 /// The outputs F_{r_i}(k-1) of the plays of a [`PlayBank`], in the bank's order, in the input's unit.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
 pub struct PlayBankState<S> {
-    plays: S,
+    pub(super) plays: S,
 }
 
 impl<S: Storage> PlayBank<S> {

@@ -1,6 +1,6 @@
 //! Number types and the arrays that hold parameters and states.
 
-use core::ops::{Add, Mul, Neg, Sub};
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A real number type that the operators run on: `f32` or `f64`.
 pub trait Sample:
@@ -9,6 +9,8 @@ pub trait Sample:
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
+    + Div<Output = Self>
+    + Into<f64>
     + Neg<Output = Self>
     + core::fmt::Debug
 {
@@ -18,6 +20,8 @@ pub trait Sample:
     const ONE: Self;
     /// Positive infinity.
     const INFINITY: Self;
+    /// The distance from one to the next larger number.
+    const EPSILON: Self;
     /// Neither NaN nor infinite.
     fn finite(self) -> bool;
     /// The smaller one; `self` where either is NaN.
@@ -46,6 +50,7 @@ macro_rules! impl_sample {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
             const INFINITY: Self = <$number>::INFINITY;
+            const EPSILON: Self = <$number>::EPSILON;
             fn finite(self) -> bool {
                 self.is_finite()
             }

@@ -3,11 +3,8 @@
 use super::lanes;
 use super::ranked::Ranked;
 use super::turning_points::TurningPoints;
+use crate::operators::IN_CACHE;
 use pulp::Simd;
-
-/// Samples for which a way is chosen; they stay in the processor's second cache. An eighth of them is no power of two,
-/// whose multiples would all go to one place of the first cache.
-const BLOCK: usize = 32_704;
 
 /// Outputs of a bank of plays, long ones, of `input` or in place of their inputs; `places` move on.
 ///
@@ -44,8 +41,8 @@ impl pulp::WithSimd for Bank<'_> {
         let ranked = Ranked::new(half_widths, weights);
         let mut copy = Vec::new();
         let mut held: Option<TurningPoints> = None;
-        for (index, block) in signal.chunks_mut(BLOCK).enumerate() {
-            let given = input.map(|input| &input[index * BLOCK..][..block.len()]);
+        for (index, block) in signal.chunks_mut(IN_CACHE).enumerate() {
+            let given = input.map(|input| &input[index * IN_CACHE..][..block.len()]);
             let way = way(given.unwrap_or(block), places.len() <= FEW_A_LANE * S::F64_LANES);
             if way == Way::Turns {
                 let input = given.unwrap_or_else(|| {

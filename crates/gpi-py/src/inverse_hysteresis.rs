@@ -1,0 +1,144 @@
+//! The inverse of the cascade.
+
+use crate::errors::{parameter, to_python};
+use crate::operators::{Deadzones, PlayBank, channels};
+use gpi_core::operators::{InverseGpi as Inverse, InverseState, Operator};
+use pyo3::exceptions::PyUserWarning;
+use pyo3::prelude::*;
+use std::ffi::CString;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The exact inverse of a cascade: ``u = D^-1[P^-1[v]]``, see [`Gpi.inverse`].
+///
+/// P^-1 are plays and D^-1 deadzones. What the limits do not reach is clamped: the drive stops at its limit, and the
+/// plays go on from there as they do forwards.
+///
+/// Examples
+/// --------
+/// >>> import gpi_hammerstein as gpi
+/// >>> op = gpi.Gpi(gpi.Deadzones([0.0, 1.0], [1.0, -0.5]), gpi.PlayBank([0.0, 0.5], [1.0, 2.0]))
+/// >>> op(op.inverse()([1.0, 5.0, 2.0])).round(12).tolist()
+/// [1.0, 5.0, 2.0]
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct InverseGpi {
+    inverse: Inverse<Vec<f64>, Vec<f64>>,
+}
+
+#[pymethods]
+impl InverseGpi {
+    /// P^-1, from v to z.
+    #[getter]
+    fn plays(&self) -> PlayBank {
+        PlayBank { bank: self.inverse.plays().clone() }
+    }
+
+    /// D^-1, from z to u.
+    #[getter]
+    fn envelope(&self) -> Deadzones {
+        Deadzones { envelope: self.inverse.envelope().clone() }
+    }
+
+    /// The lowest and the highest drive u; infinite where there is no limit.
+    #[getter]
+    fn limits(&self) -> (f64, f64) {
+        self.inverse.drive().into()
+    }
+
+    /// The drive for a signal v, shape (samples,) or (samples, channels), from rest.
+    ///
+    /// Warns (``UserWarning``) where v is out of reach.
+    fn __call__<'py>(&self, v: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let out_of_reach = AtomicU64::new(0);
+        let (u, _) = self.drive(v, None, &out_of_reach)?;
+        let beyond = out_of_reach.into_inner();
+        if beyond > 0 {
+            let (lower, upper) = self.limits();
+            let message = format!(
+                "{beyond} samples are out of reach and stand at a limit of the drive ({lower}, {upper})"
+            );
+            PyErr::warn(v.py(), &v.py().get_type::<PyUserWarning>(), &CString::new(message)?, 1)?;
+        }
+        Ok(u)
+    }
+
+    /// The drive from a given state, and the state after the last sample.
+    ///
+    /// Parameters
+    /// ----------
+    /// v : array_like, shape (samples,) or (samples, channels)
+    ///     What the cascade shall give; each channel has a state of its own.
+    /// state : array_like, shape (1 + n,) or (1 + n, channels), optional
+    ///     The number of samples that were out of reach, then where the plays stand, in the unit of v; zeros (rest)
+    ///     when left out.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray
+    ///     u in the shape of v, and the state, shape (1 + n,) or (1 + n, channels).
+    #[pyo3(signature = (v, state = None))]
+    fn run<'py>(
+        &self,
+        v: &Bound<'py, PyAny>,
+        state: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        self.drive(v, state, &AtomicU64::new(0))
+    }
+
+    fn __repr__(&self) -> String {
+        let (lower, upper) = self.limits();
+        format!(
+            "InverseGpi({} plays, drive {lower} to {upper})",
+            self.inverse.plays().weights().len()
+        )
+    }
+}
+
+impl InverseGpi {
+    pub(crate) fn new(inverse: Inverse<Vec<f64>, Vec<f64>>) -> Self {
+        Self { inverse }
+    }
+
+    fn drive<'py>(
+        &self,
+        v: &Bound<'py, PyAny>,
+        state: Option<&Bound<'py, PyAny>>,
+        out_of_reach: &AtomicU64,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let length = 1 + self.inverse.plays().weights().len();
+        channels(
+            v,
+            ("v", length),
+            state,
+            |values| self.read(values),
+            |state, input, output| {
+                let before = state.out_of_reach;
+                self.inverse.block(state, input, output);
+                out_of_reach.fetch_add(u64::from(state.out_of_reach - before), Ordering::Relaxed);
+                write(state)
+            },
+        )
+    }
+
+    fn read(&self, values: &[f64]) -> PyResult<InverseState<Vec<f64>>> {
+        let expected = 1 + self.inverse.plays().weights().len();
+        if values.len() != expected {
+            let found = values.len();
+            let message = format!(
+                "`state` has {found} elements, but {expected} are needed: the samples out of reach and the plays"
+            );
+            return Err(parameter(message));
+        }
+        let plays = self.inverse.plays().state_from(values[1..].to_vec()).map_err(to_python)?;
+        Ok(InverseState { plays, out_of_reach: values[0] as u32 })
+    }
+}
+
+/// The count, then the plays.
+pub(crate) fn write(state: &InverseState<Vec<f64>>) -> Vec<f64> {
+    let count = std::iter::once(f64::from(state.out_of_reach));
+    count.chain(state.plays.plays().iter().copied()).collect()
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<InverseGpi>()
+}
