@@ -18,7 +18,7 @@ use crate::operators::{
 /// let gpi = Gpi::new(envelope, PlayBank::new([0.0, 0.5], [1.0, 2.0])?);
 /// let inverse = gpi.inverse()?;
 /// let (mut backward, mut forward) = (inverse.rest(), gpi.rest());
-/// for wanted in [0.5, 3.0, 2.0, -1.0] {
+/// for wanted in [0.5_f64, 3.0, 2.0, -1.0] {
 ///     let u = inverse.step(&mut backward, wanted);
 ///     assert!((gpi.step(&mut forward, u) - wanted).abs() < 1e-15);
 /// }
