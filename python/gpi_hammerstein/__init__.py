@@ -18,6 +18,7 @@ u is (samples, inputs), y is (samples, outputs); only these two are measured.
 from typing import TYPE_CHECKING, Any
 
 from gpi_hammerstein._native import (
+    Compensation,
     DataError,
     Deadzones,
     Explanation,
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     from gpi_hammerstein import plot
 
 __all__ = [
+    "Compensation",
     "DataError",
     "Deadzones",
     "Explanation",

@@ -22,6 +22,8 @@ pub mod operators;
 #[cfg(feature = "identify")]
 mod chain;
 #[cfg(feature = "identify")]
+pub mod compensate;
+#[cfg(feature = "identify")]
 pub mod effects;
 #[cfg(feature = "identify")]
 mod error;

@@ -21,7 +21,7 @@ pub struct Model {
     inputs: Vec<Channel>,
     outputs: Vec<Channel>,
     hysteresis: Vec<Hysteresis>,
-    linear: StateSpace,
+    pub(crate) linear: StateSpace,
     offsets: Vec<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) effects: Vec<Effect>,

@@ -2,6 +2,7 @@
 //! a core module.
 
 mod arrays;
+mod compensate;
 mod errors;
 mod excitation;
 mod explain;
@@ -31,6 +32,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     noncausal_fir::register(module)?;
     record::register(module)?;
     model::register(module)?;
+    compensate::register(module)?;
     identification::register(module)?;
     identify::register(module)?;
     refine::register(module)?;

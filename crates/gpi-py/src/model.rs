@@ -1,6 +1,7 @@
 //! The identified model.
 
 use crate::arrays::{from_matrix, from_signal, from_vector, signal, vector};
+use crate::compensate::{self, Compensation};
 use crate::errors::{parameter, to_python};
 use crate::identification::Identification;
 use crate::identify::interruptible;
@@ -8,6 +9,7 @@ use crate::operators::{Gpi, read_state, write_state};
 use crate::record::{Record, names, units};
 use crate::refine::Refinement;
 use crate::state_space::StateSpace;
+use gpi_core::compensate::CompensateOptions;
 use gpi_core::identify::residuals_from_fitted_start;
 use gpi_core::{Matrix, ModelState, SimulationError};
 use nalgebra::DVector;
@@ -82,6 +84,19 @@ impl Model {
         let linear = DVector::from_column_slice(rest);
         Ok(ModelState { hysteresis, linear, effects, sample })
     }
+}
+
+/// Error figures as a dictionary.
+pub(crate) fn figures<'py>(
+    py: Python<'py>,
+    error: &SimulationError,
+) -> PyResult<Bound<'py, PyDict>> {
+    let result = PyDict::new(py);
+    result.set_item("rms", error.rms)?;
+    result.set_item("nrmse", error.nrmse)?;
+    result.set_item("fit_percent", error.fit_percent)?;
+    result.set_item("max", error.max)?;
+    Ok(result)
 }
 
 #[pymethods]
@@ -249,13 +264,60 @@ impl Model {
         fit_start: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let residuals = self.residuals(py, record, fit_start)?;
-        let error = SimulationError::of(&record.record, &residuals, remove_mean);
-        let result = PyDict::new(py);
-        result.set_item("rms", error.rms)?;
-        result.set_item("nrmse", error.nrmse)?;
-        result.set_item("fit_percent", error.fit_percent)?;
-        result.set_item("max", error.max)?;
-        Ok(result)
+        figures(py, &SimulationError::of(&record.record, &residuals, remove_mean))
+    }
+
+    /// The drive that makes the outputs follow a reference.
+    ///
+    /// Backwards through the chain: output stage, G by its noncausal inverse (46), the hysteresis by its exact inverse, a
+    /// delay by driving earlier. What creep and loops around G add is found by simulation: what a pass misses is added to
+    /// what the next one is asked for. The actuator is taken to stand at the reference's first value, the reference to
+    /// stay at its last one.
+    ///
+    /// Parameters
+    /// ----------
+    /// reference : array_like, shape (samples,) or (samples, outputs)
+    ///     What the outputs shall do, in their units, at the model's rate.
+    /// limits : tuple of float or list of them, optional
+    ///     Lowest and highest drive, in the inputs' units: one pair for all inputs, or one each.
+    /// slew : float, optional
+    ///     The fastest drive, in units of the input per second.
+    /// quasi_static : bool
+    ///     Leave G alone: only its DC gain is inverted, and nothing looks ahead.
+    /// preview : int, optional
+    ///     Samples by which the drive may begin before the reference; as many as G needs when left out.
+    /// passes : int
+    ///     Most passes after the first one; they end as soon as they no longer help.
+    ///
+    /// Returns
+    /// -------
+    /// Compensation
+    ///     The drive, and what the model says that it does.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     Limits that leave nothing, a hysteresis or a DC gain without an inverse.
+    /// DataError
+    ///     Another number of channels, unequal numbers of inputs and outputs, samples that are not finite.
+    /// NumericalError
+    ///     A zero of G on the unit circle.
+    #[pyo3(signature = (reference, *, limits = None, slew = None, quasi_static = false, preview = None, passes = 20))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+    fn compensate(
+        &self,
+        py: Python<'_>,
+        reference: &Bound<'_, PyAny>,
+        limits: Option<&Bound<'_, PyAny>>,
+        slew: Option<f64>,
+        quasi_static: bool,
+        preview: Option<usize>,
+        passes: usize,
+    ) -> PyResult<Compensation> {
+        let slew = slew.unwrap_or(f64::INFINITY);
+        let limits = compensate::read_limits(limits)?;
+        let options = CompensateOptions { limits, slew, quasi_static, preview, passes };
+        compensate::compensate(py, &self.model, reference, &options)
     }
 
     /// Measured minus simulated output of each experiment, each of shape (samples, outputs);

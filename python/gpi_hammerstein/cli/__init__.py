@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from gpi_hammerstein._native import DataError, ParameterError, __version__
+from gpi_hammerstein.cli.compensate import compensate
 from gpi_hammerstein.cli.demo import demo
 from gpi_hammerstein.cli.excite import excite
 from gpi_hammerstein.cli.explain import explain
@@ -45,7 +46,7 @@ def _options(
     pass
 
 
-for command in (demo, identify, explain, simulate, validate):
+for command in (demo, identify, explain, simulate, validate, compensate):
     app.command()(command)
 app.add_typer(excite, name="excite")
 app.add_typer(reproduce, name="reproduce")

@@ -5,6 +5,7 @@ Every function draws on the axes it is given and returns them. Without axes it m
 to each side, 95 % where the errors are normal.
 """
 
+from gpi_hammerstein.plot.compensation import compensation
 from gpi_hammerstein.plot.explanation import loops
 from gpi_hammerstein.plot.linear import bode, markov, singular_values
 from gpi_hammerstein.plot.residuals import (
@@ -21,6 +22,7 @@ __all__ = [
     "Residuals",
     "bode",
     "candidates",
+    "compensation",
     "fit",
     "history",
     "loop",

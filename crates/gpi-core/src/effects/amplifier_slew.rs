@@ -80,6 +80,10 @@ impl Block for AmplifierSlew {
         vec![first]
     }
 
+    fn fastest(&self) -> f64 {
+        self.limit
+    }
+
     fn drive(&self, state: &mut [f64], input: f64, moment: Moment) -> f64 {
         let reach = self.limit / moment.rate;
         state[0] += (input - state[0]).clamp(-reach, reach);

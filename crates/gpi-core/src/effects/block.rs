@@ -144,6 +144,16 @@ pub trait Block {
         input
     }
 
+    /// Input stage: samples by which the drive arrives late.
+    fn late(&self) -> f64 {
+        0.0
+    }
+
+    /// Input stage: the fastest drive that arrives as it is, in units of the input per second.
+    fn fastest(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// Plays: what half-widths grow with at a speed `|du/dt|`, the sampling rate in Hz.
     fn speed_seen(&self, state: &mut [f64], speed: f64, rate: f64) -> f64 {
         let _ = (state, rate);

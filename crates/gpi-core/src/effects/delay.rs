@@ -66,6 +66,10 @@ impl Block for Delay {
         vec![first; LONGEST as usize + 2]
     }
 
+    fn late(&self) -> f64 {
+        self.samples
+    }
+
     fn drive(&self, state: &mut [f64], input: f64, _: Moment) -> f64 {
         let needed = self.samples as usize + 2;
         let state = &mut state[..needed];

@@ -1,0 +1,87 @@
+//! The hysteresis undone: by its exact inverse, or sample by sample where effects act on its plays.
+
+use super::solve::zero_of;
+use crate::effects::{Block, Stage};
+use crate::operators::{GpiState, Operator};
+use crate::{Error, Matrix, Model, ModelState};
+
+/// The drive (samples, inputs) for v (samples, inputs), from rest, and how many samples stand at a limit.
+pub(super) fn undone(
+    model: &Model,
+    v: &Matrix,
+    limits: &[[f64; 2]],
+) -> Result<(Matrix, usize), Error> {
+    let (mut drive, mut out_of_reach) = (v.clone(), 0);
+    for (input, (mut column, &limits)) in drive.column_iter_mut().zip(limits).enumerate() {
+        let hysteresis = &model.hysteresis()[input];
+        let acts = |block: &dyn Block| block.stage() == Stage::Plays && block.channel() == input;
+        let inverse = hysteresis.inverse_within(limits[0], limits[1])?;
+        if model.effects().iter().any(|effect| acts(effect.block())) {
+            out_of_reach += follow(model, input, column.as_mut_slice(), inverse.drive())?;
+        } else {
+            let mut state = inverse.rest();
+            inverse.in_place(&mut state, column.as_mut_slice());
+            out_of_reach += state.out_of_reach as usize;
+        }
+    }
+    Ok((drive, out_of_reach))
+}
+
+/// The hysteresis of one input with the effects on its plays.
+#[derive(Clone)]
+struct Plays<'a> {
+    model: &'a Model,
+    input: usize,
+    state: GpiState<f64, Vec<f64>>,
+    memories: Vec<Vec<f64>>,
+}
+
+impl<'a> Plays<'a> {
+    /// Where they stand when all inputs are zero and this one has been raised to `u`.
+    fn standing(model: &'a Model, input: usize, u: f64) -> Result<Self, Error> {
+        let mut inputs = vec![0.0; model.inputs().len()];
+        inputs[input] = u;
+        let ModelState { mut hysteresis, effects: memories, .. } = model.start(&inputs)?;
+        Ok(Self { model, input, state: hysteresis.swap_remove(input), memories })
+    }
+
+    /// v for the next sample.
+    fn step(&mut self, u: f64) -> Result<f64, Error> {
+        let mut signal = [u];
+        self.model.play_from(self.input, &mut self.state, &mut self.memories, &mut signal)?;
+        Ok(signal[0])
+    }
+}
+
+/// Turns v of an input into u in place, and counts what no u between the limits gives.
+fn follow(
+    model: &Model,
+    input: usize,
+    signal: &mut [f64],
+    limits: [f64; 2],
+) -> Result<usize, Error> {
+    /// Of the largest v.
+    const NEAR: f64 = 1e-9;
+    let size = signal.iter().fold(f64::MIN_POSITIVE, |size, v| size.max(v.abs()));
+    let mut plays: Option<Plays> = None;
+    let (mut out_of_reach, mut before, mut stride) = (0, 0.0, 1e-3 * size);
+    for value in signal {
+        let wanted = *value;
+        let reached = |u: f64| {
+            let mut own = match &plays {
+                Some(plays) => plays.clone(),
+                None => Plays::standing(model, input, u)?,
+            };
+            Ok::<_, Error>((own.step(u)?, own))
+        };
+        let missing = |u: f64| reached(u).map_or(f64::NAN, |(v, _)| v - wanted);
+        let u = zero_of(missing, before, stride, limits);
+        let (v, own) = reached(u)?;
+        plays = Some(own);
+        out_of_reach += usize::from((v - wanted).abs() > NEAR * size);
+        stride = (u - before).abs().max(1e-6 * size);
+        before = u;
+        *value = u;
+    }
+    Ok(out_of_reach)
+}

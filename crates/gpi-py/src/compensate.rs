@@ -1,0 +1,134 @@
+//! Drives that make an output follow a reference.
+
+use crate::arrays::{from_signal, from_vector, signal};
+use crate::errors::{parameter, to_python};
+use crate::model::figures;
+use gpi_core::compensate::{CompensateOptions, Compensation as Found};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// A drive that makes a model's outputs follow a reference, see ``Model.compensate``.
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct Compensation {
+    found: Found,
+    rate: f64,
+    one_dimensional: bool,
+}
+
+#[pymethods]
+impl Compensation {
+    /// Time of each sample of the drive in s, shape (lead + samples,); the reference begins at 0.
+    #[getter]
+    fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        let lead = self.found.lead as f64;
+        let rows = self.found.drive.nrows();
+        let time: Vec<f64> = (0..rows).map(|k| (k as f64 - lead) / self.rate).collect();
+        from_vector(py, &time)
+    }
+
+    /// u, shape (lead + samples,) or (lead + samples, inputs), in the inputs' units.
+    #[getter]
+    fn drive<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_signal(py, self.found.drive.clone(), self.one_dimensional)
+    }
+
+    /// The reference with the lead, in which it stands at its first value; the shape of the drive, in the outputs' units.
+    #[getter]
+    fn reference<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_signal(py, self.found.reference.clone(), self.one_dimensional)
+    }
+
+    /// What the model says that the outputs do, without the effects that no input drives; the shape of the drive.
+    #[getter]
+    fn predicted<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_signal(py, self.found.predicted.clone(), self.one_dimensional)
+    }
+
+    /// Samples by which the drive begins before the reference.
+    #[getter]
+    fn lead(&self) -> usize {
+        self.found.lead
+    }
+
+    /// Reference less prediction over the reference's own samples: rms and max in the output's unit, nrmse, fit_percent.
+    #[getter]
+    fn error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        figures(py, &self.found.error)
+    }
+
+    /// What the outputs do for a drive in proportion to the reference, between the same extremes; the shape of the drive.
+    #[getter]
+    fn in_proportion<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_signal(py, self.found.in_proportion.clone(), self.one_dimensional)
+    }
+
+    /// Reference less ``in_proportion``, as ``error``.
+    #[getter]
+    fn error_in_proportion<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        figures(py, &self.found.error_in_proportion)
+    }
+
+    /// Root mean square error after each pass, in the output's unit, shape (passes,).
+    #[getter]
+    fn passes<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, &self.found.passes)
+    }
+
+    /// Samples at which a drive stands at a limit because what is asked for lies beyond.
+    #[getter]
+    fn out_of_reach(&self) -> usize {
+        self.found.out_of_reach
+    }
+
+    /// Samples at which a drive would have had to be faster than it may be.
+    #[getter]
+    fn too_fast(&self) -> usize {
+        self.found.too_fast
+    }
+
+    /// Names of the model's effects that the drive compensates.
+    #[getter]
+    fn compensated(&self) -> Vec<&'static str> {
+        self.found.compensated.clone()
+    }
+
+    /// Names of the model's effects that no drive compensates, with the reason.
+    #[getter]
+    fn left(&self) -> Vec<(&'static str, &'static str)> {
+        self.found.left.clone()
+    }
+
+    fn __repr__(&self) -> String {
+        let (error, before) = (self.found.error.rms, self.found.error_in_proportion.rms);
+        format!(
+            "Compensation({} samples, rms error {error:.3e}, {before:.3e} in proportion)",
+            self.found.drive.nrows()
+        )
+    }
+}
+
+/// What `Model.compensate` does.
+pub(crate) fn compensate(
+    py: Python<'_>,
+    model: &gpi_core::Model,
+    reference: &Bound<'_, PyAny>,
+    options: &CompensateOptions,
+) -> PyResult<Compensation> {
+    let (reference, one_dimensional) = signal("reference", reference)?;
+    let found = py.detach(|| model.compensate(&reference, options)).map_err(to_python)?;
+    Ok(Compensation { found, rate: model.rate(), one_dimensional })
+}
+
+/// A pair of limits for all inputs, or a list of pairs.
+pub(crate) fn read_limits(limits: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<(f64, f64)>> {
+    let Some(limits) = limits else { return Ok(Vec::new()) };
+    if let Ok(pair) = limits.extract::<(f64, f64)>() {
+        return Ok(vec![pair]);
+    }
+    let message = "`limits` must be a pair of numbers, or a list of such pairs";
+    limits.extract().map_err(|_| parameter(message.to_owned()))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Compensation>()
+}

@@ -1,0 +1,47 @@
+"""What a drive makes of a reference."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from gpi_hammerstein._native import Compensation, Model
+from gpi_hammerstein.plot.style import BLUE, VERMILION, axes, label
+
+
+def compensation(model: Model, found: Compensation, ax: Axes | None = None) -> Axes:
+    """Draw the output over the reference: a loop for a drive in proportion, a line for the one found.
+
+    Parameters
+    ----------
+    model
+        The model that was compensated; its first output is drawn, in its unit.
+    found
+        What ``model.compensate`` returned.
+    ax
+        Axes to draw on.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.compensation(model, model.compensate(reference))  # doctest: +SKIP
+    """
+    ax = axes(ax, 5.0, 5.0)
+
+    def first(signal: np.ndarray) -> np.ndarray:
+        return signal.reshape(len(found.time), -1)[found.lead :, 0]
+
+    reference = first(found.reference)
+    for signal, error, color, what in (
+        (found.in_proportion, found.error_in_proportion, BLUE, "drive in proportion"),
+        (found.predicted, found.error, VERMILION, "compensated drive"),
+    ):
+        fit = f"{what}, {100 * error['nrmse']:.2g} % rms"
+        ax.plot(reference, first(signal), color=color, lw=0.9, label=fit)
+    ax.set_xlabel(label(f"reference for {model.output_names[0]}", model.output_units[0]))
+    ax.set_ylabel(label(f"predicted {model.output_names[0]}", model.output_units[0]))
+    ax.set_title("What the drive makes of the reference")
+    ax.legend(loc="upper left")
+    return ax

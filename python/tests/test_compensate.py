@@ -1,0 +1,176 @@
+"""Drives that make the oracle's chain follow a reference, effect by effect."""
+
+import json
+
+import numpy as np
+import polars as pl
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import gpi_hammerstein as gpi
+from gpi_hammerstein import cli
+from records import RATE, model_of
+from test_effects import CASES, chain, plant, with_effect
+
+SAMPLES = 500
+SIZES, SPEEDS = [1.2, 0.5, 0.2], [0.02, 0.06, 0.15]
+LEFT = {"gain-drift", "drift", "periodic-disturbance", "outliers", "coloured-noise"}
+# An ideal drive meets the reference to rounding. A delay between two samples smooths the drive a little.
+NEAR = {"delay": 1e-4}
+
+
+def reference(samples=SAMPLES, seed=3):
+    """A smooth path that begins and ends at rest, of either direction, with minor loops."""
+    random = np.random.default_rng(seed)
+    t = np.arange(samples)
+    phases = random.uniform(0, 6, 3)
+    waves = [a * np.sin(w * t + p) for a, w, p in zip(SIZES, SPEEDS, phases, strict=True)]
+    inside = np.clip((t - 20) / 60, 0, 1) * np.clip((samples - 20 - t) / 60, 0, 1)
+    return 0.7 + np.sum(waves, axis=0) * inside**2 * (3 - 2 * inside)
+
+
+def reached(found, **place):
+    """What the oracle makes of the drive, behind the lead."""
+    return chain(found.drive, **place)[found.lead :]
+
+
+def test_the_declared_model_follows_exactly():
+    wanted = reference()
+    found = model_of(plant()).compensate(wanted)
+    assert np.max(np.abs(reached(found) - wanted)) < 1e-11
+    assert found.error["max"] < 1e-11 and found.error_in_proportion["max"] > 0.1
+    assert found.out_of_reach == found.too_fast == 0
+    assert (found.compensated, found.left) == ([], [])
+    np.testing.assert_array_equal(found.reference[found.lead :], wanted)
+    np.testing.assert_allclose(found.time[[0, found.lead]], [-found.lead / RATE, 0.0])
+
+
+@pytest.mark.parametrize("name", sorted(set(CASES) - LEFT - {"amplifier-slew"}))
+def test_what_the_input_drives_is_compensated(name):
+    parameters, place = CASES[name]
+    wanted = reference()
+    found = with_effect(model_of(plant()), name=name, **parameters).compensate(wanted)
+    without = model_of(plant()).compensate(wanted)
+    assert np.max(np.abs(reached(found, **place) - wanted)) < NEAR.get(name, 1e-9)
+    assert found.compensated == [name] and found.left == []
+    assert np.max(np.abs(reached(without, **place) - wanted)) > 1e-3
+
+
+def test_the_drive_stays_below_what_the_amplifier_can():
+    parameters, place = CASES["amplifier-slew"]
+    found = with_effect(model_of(plant()), name="amplifier-slew", **parameters).compensate(reference())
+    assert found.left == [("amplifier-slew", "the drive is kept below its limit instead")]
+    assert found.too_fast > 0
+    assert np.max(np.abs(np.diff(found.drive))) <= parameters["limit"] / RATE * (1 + 1e-12)
+    np.testing.assert_allclose(reached(found, **place), found.predicted[found.lead :], rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", sorted(LEFT))
+def test_what_no_input_drives_is_left_and_said(name):
+    wanted = reference()
+    found = with_effect(model_of(plant()), name=name, **CASES[name][0]).compensate(wanted)
+    assert found.left == [(name, "the input does not drive it")]
+    np.testing.assert_array_equal(found.drive, model_of(plant()).compensate(wanted).drive)
+
+
+def test_dead_time_is_driven_ahead_of():
+    wanted = reference()
+    found = model_of(plant(delay=5)).compensate(wanted)
+    assert found.lead >= 5
+    assert np.max(np.abs(chain(found.drive, delay=5)[found.lead :] - wanted)) < 1e-11
+
+
+def test_dynamics_left_alone():
+    slow = np.repeat(reference(), 40)
+    smooth = np.convolve(np.pad(slow, 200, mode="edge"), np.ones(401) / 401, mode="valid")
+    found = model_of(plant()).compensate(smooth, quasi_static=True)
+    assert found.lead == 0 and len(found.drive) == len(smooth)
+    model = model_of(plant())
+    still = 0.7 + model.linear.dc_gain[0, 0] * model.intermediate(found.drive).ravel()
+    assert np.max(np.abs(still - smooth)) < 1e-12
+    # what is left is what G takes to get there
+    assert np.max(np.abs(chain(found.drive) - smooth)) < 0.1 * found.error_in_proportion["max"]
+
+
+def test_within_limits_and_speed():
+    wanted = reference()
+    free = model_of(plant()).compensate(wanted).drive
+    low, high = 0.5 * free.min(), 0.5 * free.max()
+    found = model_of(plant()).compensate(wanted, limits=(low, high))
+    assert found.out_of_reach > 20
+    assert found.drive.min() >= low and found.drive.max() <= high
+    slew = 0.5 * np.max(np.abs(np.diff(free))) * RATE
+    found = model_of(plant()).compensate(wanted, slew=slew)
+    assert found.too_fast > 0
+    assert np.max(np.abs(np.diff(found.drive))) <= slew / RATE * (1 + 1e-12)
+
+
+@given(st.integers(0, 10**6), st.floats(0.1, 3.0))
+def test_any_path_is_followed(seed, size):
+    wanted = 0.7 + size * (reference(200, seed) - 0.7)
+    found = model_of(plant()).compensate(wanted)
+    assert np.max(np.abs(reached(found) - wanted)) < 1e-10 * max(size, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"limits": (1.0, -1.0)}, gpi.ParameterError, "`limits` = 1, -1"),
+        ({"limits": "wide"}, gpi.ParameterError, "`limits` must be a pair of numbers"),
+        ({"limits": [(0.0, 1.0)] * 3}, gpi.DataError, "`limits` has 3 inputs, but `model` has 1"),
+        ({"slew": 0.0}, gpi.ParameterError, "`slew` = 0"),
+        ({"slew": float("nan")}, gpi.ParameterError, "`slew` = NaN"),
+        ({"reference": [0.0, np.nan]}, gpi.DataError, "has 1 NaN or infinite samples, the first in row 1"),
+        ({"reference": []}, gpi.DataError, "0 usable samples"),
+        ({"reference": np.zeros((5, 2))}, gpi.DataError, "`reference` has 2 outputs, but `model` has 1"),
+    ],
+)
+def test_wrong_calls_are_named(arguments, error, message):
+    with pytest.raises(error) as told:
+        model_of(plant()).compensate(**({"reference": reference()} | arguments))
+    assert message in str(told.value)
+
+
+def write(path, column="y_um", rate=RATE):
+    wanted = reference()
+    pl.DataFrame({"t_s": np.arange(len(wanted)) / rate, column: wanted}).write_csv(path)
+    return path
+
+
+@pytest.fixture
+def saved(tmp_path):
+    model_of(plant()).save(tmp_path / "model.json")
+    return str(tmp_path / "model.json")
+
+
+def test_the_command_writes_a_drive_that_works(saved, tmp_path, capsys):
+    path = write(tmp_path / "path.csv")
+    assert cli.run(["compensate", saved, str(path), "-o", str(tmp_path / "out"), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["schema"] == "gpi-compensation/1" and result["out_of_reach"] == 0
+    assert result["error"]["predicted"]["max"] < 1e-11 < 0.1 < result["error"]["in_proportion"]["max"]
+    table = pl.read_csv(tmp_path / "out" / "drive.csv")
+    assert table.columns == ["t", "u", "reference_y", "predicted_y", "in_proportion_y"]
+    assert (
+        np.max(np.abs(chain(table["u"].to_numpy()) - table["reference_y"].to_numpy())[table["t"] >= 0])
+        < 1e-11
+    )
+    assert json.loads((tmp_path / "out" / "compensation.json").read_text()) == result
+    assert (tmp_path / "out" / "compensation.png").stat().st_size > 10_000
+
+
+def test_the_command_speaks(saved, tmp_path, capsys):
+    path = write(tmp_path / "path.csv", column="wanted")
+    assert cli.run(["compensate", saved, str(path)]) == 3
+    assert "name the reference's columns (--reference)" in capsys.readouterr().err
+    assert (
+        cli.run(["compensate", saved, str(path), "-r", "wanted", "--limits", "-0.5,0.5", "--slew", "5"]) == 0
+    )
+    said = capsys.readouterr().out
+    assert "Predicted error" in said and "stand at a limit" in said and "fastest drive" in said
+    assert cli.run(["compensate", saved, str(path), "-r", "wanted", "--limits", "5"]) == 2
+    assert "such as -10,150" in capsys.readouterr().err
+    other = write(tmp_path / "slow.csv", rate=500.0)
+    assert cli.run(["compensate", saved, str(other)]) == 3
+    assert "resample it (--resample 1000)" in capsys.readouterr().err
