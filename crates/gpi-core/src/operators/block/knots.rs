@@ -6,6 +6,8 @@ pub(super) struct Knots {
     buckets: Vec<Bucket>,
     lowest: f64,
     scale: f64,
+    /// The last bucket.
+    last: f64,
 }
 
 /// The numbers of a part of their range.
@@ -31,7 +33,8 @@ impl Knots {
         let scale = last as f64 / (highest - lowest);
         let scale = if scale.is_finite() { scale } else { 0.0 };
         let empty = Bucket { first: f64::INFINITY, before: 0, count: 0 };
-        let mut knots = Self { values, buckets: vec![empty; last + 1], lowest, scale };
+        let mut knots =
+            Self { values, buckets: vec![empty; last + 1], lowest, scale, last: last as f64 };
         for i in 0..knots.values.len() {
             let (value, bucket) = (knots.values[i], knots.bucket(knots.values[i]));
             let bucket = &mut knots.buckets[bucket];
@@ -46,10 +49,21 @@ impl Knots {
         knots
     }
 
-    /// It keeps the order of numbers: all in an earlier bucket are smaller.
+    /// Its number in each bucket, or infinity; how many are in earlier buckets; how many there are.
+    pub(super) fn buckets(&self) -> impl Iterator<Item = (f64, usize, usize)> {
+        let parts = |bucket: &Bucket| (bucket.first, bucket.before as usize, bucket.count as usize);
+        self.buckets.iter().map(parts)
+    }
+
+    /// Where a number that is no NaN falls. It keeps the order of numbers: all in an earlier bucket are smaller.
     #[inline(always)]
-    fn bucket(&self, x: f64) -> usize {
-        (((x - self.lowest) * self.scale) as usize).min(self.buckets.len() - 1)
+    pub(super) fn bucket(&self, x: f64) -> usize {
+        /// To this a number below 2^31 adds up to its nearest integer in the last digits.
+        const INTEGER: f64 = 4_503_599_627_370_496.0;
+        let place = (x - self.lowest) * self.scale;
+        let place = if place > 0.0 { place } else { 0.0 };
+        let place = if place < self.last { place } else { self.last };
+        (place + INTEGER).to_bits() as u32 as usize
     }
 
     /// How many are at most x.

@@ -1,6 +1,7 @@
 //! The operators over long records, at a cost that hardly grows with their number of plays or deadzones.
 
 pub(super) mod bank;
+mod curve;
 mod knots;
 mod lanes;
 mod ranked;

@@ -1,6 +1,6 @@
 //! The half-widths of a bank in order, with sums over those below.
 
-use super::knots::Knots;
+use super::curve::Curve;
 
 /// Plays by half-width.
 pub(super) struct Ranked {
@@ -12,9 +12,8 @@ pub(super) struct Ranked {
     pub weights: Vec<f64>,
     /// Sums of p r over the first so many plays.
     pub moments: Vec<f64>,
-    /// Both, side by side.
-    lines: Vec<(f64, f64)>,
-    knots: Knots,
+    /// `sum_i p_i max(x - r_i, 0)`.
+    curve: Curve,
 }
 
 impl Ranked {
@@ -24,11 +23,11 @@ impl Ranked {
         let sorted: Vec<f64> = order.iter().map(|&i| half_widths[i]).collect();
         let moments = sums(order.iter().map(|&i| weights[i] * half_widths[i]));
         let weights = sums(order.iter().map(|&i| weights[i]));
+        let lines = weights.iter().zip(&moments).map(|(&weight, &moment)| (weight, -moment));
         Self {
-            lines: weights.iter().copied().zip(moments.iter().copied()).collect(),
+            curve: Curve::new(sorted.clone(), lines.collect()),
             weights,
             moments,
-            knots: Knots::new(sorted.clone()),
             half_widths: sorted,
             order,
         }
@@ -41,14 +40,13 @@ impl Ranked {
     /// How many half-widths are at most x.
     #[inline(always)]
     pub(super) fn at_most(&self, x: f64) -> usize {
-        self.knots.at_most(x)
+        self.curve.at_most(x)
     }
 
     /// `sum_i p_i max(x - r_i, 0)`.
     #[inline(always)]
     pub(super) fn beyond(&self, x: f64) -> f64 {
-        let (weights, moments) = self.lines[self.at_most(x)];
-        weights * x - moments
+        self.curve.at(x)
     }
 }
 

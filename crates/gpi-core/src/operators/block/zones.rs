@@ -1,40 +1,24 @@
 //! A sum of deadzones as one piecewise linear curve.
 
-use super::knots::Knots;
+use super::curve::Curve;
 use super::ranked::sums;
 use crate::operators::Reading;
 
-/// `a_c x + b_c`, c the number of knots at most x.
-struct Curve {
-    knots: Knots,
-    lines: Vec<(f64, f64)>,
-}
-
-impl Curve {
-    /// `sum_j g_j max(x - eta_j, 0)`, less `sum_j h_j max(eta_j - x, 0)`; terms are `(eta, g, h)`.
-    fn new(mut terms: Vec<(f64, f64, f64)>) -> Self {
-        terms.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let all = |part: fn(&(f64, f64, f64)) -> f64| sums(terms.iter().map(part));
-        // below: what the knots that x has passed add; above: what the others still take
-        let (below, below_moment) = (all(|t| t.1), all(|t| t.1 * t.0));
-        let rest = |part: fn(&(f64, f64, f64)) -> f64| {
-            let mut rest = sums(terms.iter().rev().map(part));
-            rest.reverse();
-            rest
-        };
-        let (above, above_moment) = (rest(|t| t.2), rest(|t| t.2 * t.0));
-        let line = |c: usize| (below[c] + above[c], -below_moment[c] - above_moment[c]);
-        Self {
-            lines: (0..=terms.len()).map(line).collect(),
-            knots: Knots::new(terms.iter().map(|term| term.0).collect()),
-        }
-    }
-
-    #[inline(always)]
-    fn at(&self, x: f64) -> f64 {
-        let (slope, constant) = self.lines[self.knots.at_most(x)];
-        slope * x + constant
-    }
+/// `sum_j g_j max(x - eta_j, 0)`, less `sum_j h_j max(eta_j - x, 0)`; terms are `(eta, g, h)`.
+fn curve(mut terms: Vec<(f64, f64, f64)>) -> Curve {
+    terms.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all = |part: fn(&(f64, f64, f64)) -> f64| sums(terms.iter().map(part));
+    // below: what the knots that x has passed add; above: what the others still take
+    let (below, below_moment) = (all(|t| t.1), all(|t| t.1 * t.0));
+    let rest = |part: fn(&(f64, f64, f64)) -> f64| {
+        let mut rest = sums(terms.iter().rev().map(part));
+        rest.reverse();
+        rest
+    };
+    let (above, above_moment) = (rest(|t| t.2), rest(|t| t.2 * t.0));
+    let line = |c: usize| (below[c] + above[c], -below_moment[c] - above_moment[c]);
+    let lines = (0..=terms.len()).map(line).collect();
+    Curve::new(terms.iter().map(|term| term.0).collect(), lines)
 }
 
 /// Whether a signal is long enough for it to pay that the curve is worked out first.
@@ -65,11 +49,11 @@ pub(crate) fn in_place(
                 _ if eta < 0.0 => (eta, 0.0, g),
                 _ => (eta, g, g),
             };
-            let curve = Curve::new(zones.map(term).collect());
+            let curve = curve(zones.map(term).collect());
             signal.iter_mut().for_each(|u| *u = curve.at(*u));
         }
         Reading::Directional => {
-            let rising = Curve::new(zones.map(|(&eta, &g)| (eta, g, 0.0)).collect());
+            let rising = curve(zones.map(|(&eta, &g)| (eta, g, 0.0)).collect());
             let mut before = *previous;
             for value in signal {
                 let u = *value;
