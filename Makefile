@@ -17,7 +17,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # The order of `make test` is part of what it promises, also under `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench bench-peers figures monte-carlo scoreboard blind-exam clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench bench-peers figures monte-carlo tracking firmware-cost scoreboard blind-exam clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -74,6 +74,12 @@ figures: $(NATIVE) ## Print the figures of README; needs the measured data
 
 monte-carlo: $(NATIVE) ## Print errors over the Cramer-Rao bound and the coverage of intervals
 	$(BIN)/python tools/monte_carlo.py
+
+tracking: $(NATIVE) ## Print how well drives make a changed plant follow a reference, into docs/tracking.md
+	$(BIN)/python tools/tracking.py --markdown docs/tracking.md
+
+firmware-cost: $(NATIVE) ## Count a compensator's instructions on a Cortex-M4F in QEMU, into docs/firmware.md
+	$(BIN)/python tools/firmware_cost.py --markdown docs/firmware.md
 
 scoreboard: $(NATIVE) ## Print how often `explain` names the right effect; takes long
 	$(BIN)/python tools/scoreboard.py

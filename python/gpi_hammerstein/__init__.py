@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from gpi_hammerstein._native import (
     Compensation,
+    Compensator,
     DataError,
     Deadzones,
     Explanation,
@@ -52,6 +53,7 @@ from gpi_hammerstein._native import (
     residual_tests,
     sensitivities,
 )
+from gpi_hammerstein.export import export_c, export_rust
 from gpi_hammerstein.files import load_model as load
 from gpi_hammerstein.files import save_model as save
 from gpi_hammerstein.io import read_record
@@ -61,6 +63,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Compensation",
+    "Compensator",
     "DataError",
     "Deadzones",
     "Explanation",
@@ -85,6 +88,8 @@ __all__ = [
     "effect_names",
     "era",
     "explain",
+    "export_c",
+    "export_rust",
     "fir",
     "fit_hysteresis",
     "identify",

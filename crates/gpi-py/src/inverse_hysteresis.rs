@@ -1,8 +1,9 @@
 //! The inverse of the cascade.
 
+use crate::arrays::from_vector;
 use crate::errors::{parameter, to_python};
 use crate::operators::{Deadzones, PlayBank, channels};
-use gpi_core::operators::{InverseGpi as Inverse, InverseState, Operator};
+use gpi_core::operators::{InverseGpi as Inverse, InverseState, Operator, OperatorError};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use std::ffi::CString;
@@ -38,10 +39,31 @@ impl InverseGpi {
         Deadzones { envelope: self.inverse.envelope().clone() }
     }
 
+    /// D^-1 as a curve: knots, shape (m,), the drive at each, shape (m,), and the slopes before the first one and behind
+    /// each, shape (m + 1,).
+    #[getter]
+    fn curve<'py>(&self, py: Python<'py>) -> [Bound<'py, PyAny>; 3] {
+        let curve = self.inverse.curve();
+        let slopes = [&[curve.below()], curve.slopes()].concat();
+        [curve.knots(), curve.heights(), &slopes].map(|values| from_vector(py, values))
+    }
+
     /// The lowest and the highest drive u; infinite where there is no limit.
     #[getter]
     fn limits(&self) -> (f64, f64) {
         self.inverse.drive().into()
+    }
+
+    /// The lowest and the highest z, the envelope's outputs at these drives.
+    #[getter]
+    fn reach(&self) -> (f64, f64) {
+        self.inverse.reach().into()
+    }
+
+    /// The lowest and the highest v that are within reach wherever the plays stand.
+    #[getter]
+    fn safe(&self) -> (f64, f64) {
+        self.inverse.safe().into()
     }
 
     /// The drive for a signal v, shape (samples,) or (samples, channels), from rest.
@@ -128,9 +150,17 @@ impl InverseGpi {
             );
             return Err(parameter(message));
         }
-        let plays = self.inverse.plays().state_from(values[1..].to_vec()).map_err(to_python)?;
-        Ok(InverseState { plays, out_of_reach: values[0] as u32 })
+        read(&self.inverse, values).map_err(to_python)
     }
+}
+
+/// From the count, then the plays.
+pub(crate) fn read(
+    inverse: &Inverse<Vec<f64>, Vec<f64>>,
+    values: &[f64],
+) -> Result<InverseState<Vec<f64>>, OperatorError> {
+    let plays = inverse.plays().state_from(values[1..].to_vec())?;
+    Ok(InverseState { plays, out_of_reach: values[0] as u32 })
 }
 
 /// The count, then the plays.

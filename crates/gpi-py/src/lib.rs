@@ -3,6 +3,7 @@
 
 mod arrays;
 mod compensate;
+mod compensator;
 mod errors;
 mod excitation;
 mod explain;
@@ -32,6 +33,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     noncausal_fir::register(module)?;
     record::register(module)?;
     model::register(module)?;
+    compensator::register(module)?;
     compensate::register(module)?;
     identification::register(module)?;
     identify::register(module)?;

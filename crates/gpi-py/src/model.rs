@@ -2,6 +2,7 @@
 
 use crate::arrays::{from_matrix, from_signal, from_vector, signal, vector};
 use crate::compensate::{self, Compensation};
+use crate::compensator::Compensator;
 use crate::errors::{parameter, to_python};
 use crate::identification::Identification;
 use crate::identify::interruptible;
@@ -318,6 +319,33 @@ impl Model {
         let limits = compensate::read_limits(limits)?;
         let options = CompensateOptions { limits, slew, quasi_static, preview, passes };
         compensate::compensate(py, &self.model, reference, &options)
+    }
+
+    /// The compensator that runs one sample at a time and knows the past only.
+    ///
+    /// Hysteresis and creep are undone exactly, of the dynamics their DC gain: for references that are slow next to G, and
+    /// for microcontrollers (``gpi export``).
+    ///
+    /// Parameters
+    /// ----------
+    /// limits : tuple of float, optional
+    ///     Lowest and highest drive, in the input's unit.
+    ///
+    /// Returns
+    /// -------
+    /// Compensator
+    ///     The compensator, with the parts of the model that it leaves alone.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     Limits that leave nothing, a hysteresis or a DC gain without an inverse.
+    /// DataError
+    ///     Several inputs or outputs.
+    #[pyo3(signature = (*, limits = None))]
+    fn compensator(&self, limits: Option<(f64, f64)>) -> PyResult<Compensator> {
+        let limits = limits.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        self.model.compensator(limits).map(Compensator::new).map_err(to_python)
     }
 
     /// Measured minus simulated output of each experiment, each of shape (samples, outputs);

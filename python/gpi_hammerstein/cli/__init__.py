@@ -12,6 +12,7 @@ from gpi_hammerstein.cli.compensate import compensate
 from gpi_hammerstein.cli.demo import demo
 from gpi_hammerstein.cli.excite import excite
 from gpi_hammerstein.cli.explain import explain
+from gpi_hammerstein.cli.export import export
 from gpi_hammerstein.cli.identify import identify
 from gpi_hammerstein.cli.output import complain
 from gpi_hammerstein.cli.reproduce import reproduce
@@ -46,7 +47,7 @@ def _options(
     pass
 
 
-for command in (demo, identify, explain, simulate, validate, compensate):
+for command in (demo, identify, explain, simulate, validate, compensate, export):
     app.command()(command)
 app.add_typer(excite, name="excite")
 app.add_typer(reproduce, name="reproduce")

@@ -5,11 +5,13 @@ mod input;
 mod output;
 mod plays;
 mod solve;
+mod streaming;
 
 use crate::effects::{Effect, Stage};
 use crate::{Error, Experiment, Matrix, Model, Record, SimulationError};
 use dynamics::Backward;
 use std::cmp::Ordering;
+pub use streaming::StreamingCompensator;
 
 /// What a drive may do, and how it is found.
 #[derive(Clone, Debug, PartialEq)]

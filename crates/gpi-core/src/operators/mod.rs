@@ -1,4 +1,5 @@
-//! Hysteresis operators, in the order the signal meets them: deadzones, plays, and their cascade.
+//! Operators, in the order the signal meets them: deadzones, plays, their cascade, lags and linear dynamics; and the way
+//! back from a reference to the drive.
 //!
 //! Configuration (half-widths, thresholds, weights) and state are kept apart: one configuration may
 //! drive any number of channels. Every operator is a [`Operator::step`] first; the block forms run
@@ -10,14 +11,18 @@ mod cascade;
 mod deadzones;
 mod error;
 mod inverse;
+mod lags;
 mod plays;
+mod state_space;
 mod storage;
 
 pub use cascade::{Gpi, GpiState};
 pub use deadzones::{Deadzones, DeadzonesState, Reading};
 pub use error::OperatorError;
-pub use inverse::{InverseGpi, InverseState};
+pub use inverse::{Compensator, CompensatorState, Curve, InverseGpi, InverseState};
+pub use lags::{Lags, LagsState};
 pub use plays::{PlayBank, PlayBankState, play};
+pub use state_space::StateSpaceStep;
 pub use storage::{Sample, Storage};
 
 /// Samples that go through one operator after the other at once: `f64` in and out stay in the processor's second

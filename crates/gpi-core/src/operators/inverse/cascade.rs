@@ -1,5 +1,6 @@
 //! The inverse of the cascade: plays, then deadzones.
 
+use super::curve::Curve;
 use super::envelope::Inverted;
 use crate::operators::{
     Deadzones, Gpi, GpiState, IN_CACHE, Operator, OperatorError, PlayBank, PlayBankState, Sample,
@@ -28,6 +29,8 @@ use crate::operators::{
 pub struct InverseGpi<E: Storage, S> {
     plays: PlayBank<S>,
     envelope: Deadzones<E>,
+    /// The envelope, for one sample.
+    curve: Curve<E>,
     drive: [E::Item; 2],
     reach: [E::Item; 2],
     /// Between these every v is within reach, wherever the plays stand.
@@ -69,7 +72,8 @@ where
         let plays = self.plays().inverse()?;
         let Inverted { envelope, drive, reach } = self.envelope().inverse([lower, upper])?;
         let safe = safe(&plays, reach);
-        Ok(InverseGpi { plays, envelope, drive, reach, safe })
+        let curve = Curve::new(&envelope);
+        Ok(InverseGpi { plays, envelope, curve, drive, reach, safe })
     }
 
     /// The state of [`Gpi::inverse`] that belongs to a state of the cascade.
@@ -114,6 +118,11 @@ where
         &self.envelope
     }
 
+    /// D^-1 as a curve, of which a sample needs one piece.
+    pub fn curve(&self) -> &Curve<E> {
+        &self.curve
+    }
+
     /// The lowest and the highest drive u.
     pub fn drive(&self) -> [E::Item; 2] {
         self.drive
@@ -124,16 +133,30 @@ where
         self.reach
     }
 
+    /// The lowest and the highest v that are within reach wherever the plays stand.
+    pub fn safe(&self) -> [E::Item; 2] {
+        self.safe
+    }
+
     /// The drive for z.
     #[inline]
     fn drive_for(&self, z: E::Item) -> E::Item {
-        let u = self.envelope.step(&mut self.envelope.rest(), z);
-        u.at_most(self.drive[1]).at_least(self.drive[0])
+        self.curve.at(z).at_most(self.drive[1]).at_least(self.drive[0])
+    }
+
+    /// The drive u for v, and the v that it reaches.
+    #[inline]
+    pub fn step_reached(&self, state: &mut InverseState<S>, v: E::Item) -> (E::Item, E::Item) {
+        if v < self.safe[0] || v > self.safe[1] {
+            self.step_to_limit(state, v)
+        } else {
+            (self.drive_for(self.plays.step(&mut state.plays, v)), v)
+        }
     }
 
     /// The step where v may be out of reach.
     #[cold]
-    fn step_to_limit(&self, state: &mut InverseState<S>, v: E::Item) -> E::Item {
+    fn step_to_limit(&self, state: &mut InverseState<S>, v: E::Item) -> (E::Item, E::Item) {
         let z = self.plays.output_for(&state.plays, v);
         let within = z.at_most(self.reach[1]).at_least(self.reach[0]);
         let mut nearest = v;
@@ -142,7 +165,7 @@ where
             state.out_of_reach = state.out_of_reach.saturating_add(1);
         }
         self.plays.step(&mut state.plays, nearest);
-        self.drive_for(within)
+        (self.drive_for(within), nearest)
     }
 }
 
@@ -197,11 +220,7 @@ where
     /// The drive u for v.
     #[inline]
     fn step(&self, state: &mut InverseState<S>, v: E::Item) -> E::Item {
-        if v < self.safe[0] || v > self.safe[1] {
-            return self.step_to_limit(state, v);
-        }
-        let z = self.plays.step(&mut state.plays, v);
-        self.drive_for(z)
+        self.step_reached(state, v).0
     }
 
     fn block(&self, state: &mut Self::State, input: &[E::Item], output: &mut [E::Item]) -> usize {

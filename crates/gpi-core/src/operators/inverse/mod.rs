@@ -2,6 +2,10 @@
 
 mod bank;
 mod cascade;
+mod compensator;
+mod curve;
 mod envelope;
 
 pub use cascade::{InverseGpi, InverseState};
+pub use compensator::{Compensator, CompensatorState};
+pub use curve::Curve;

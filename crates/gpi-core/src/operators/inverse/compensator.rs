@@ -1,0 +1,217 @@
+//! From a reference to the drive, one sample at a time.
+
+use super::cascade::{InverseGpi, InverseState};
+use crate::operators::error::require_finite;
+use crate::operators::{Lags, LagsState, Operator, OperatorError, Sample, Storage};
+
+/// `u = D^-1[P^-1[v]]`, `v = (r - offset - sum_i c_i l_i) / gain`: the drive that makes an actuator with creep follow a
+/// reference r that is slow next to its dynamics.
+///
+/// The actuator is `y = gain v + sum_i c_i l_i + offset`, v from a [`crate::operators::Gpi`] and l_i its [`Lags`]. What
+/// the lags add to a sample does not depend on v of that sample, so that it is known beforehand. Where the drive stops
+/// at a limit, creep goes on with the v that is reached.
+///
+/// `E`, `S` and `L` store the deadzones, the plays and the lags: `[T; N]` on firmware.
+///
+/// ```
+/// use gpi_core::operators::{Compensator, Deadzones, Gpi, Lags, Operator, PlayBank, Reading};
+/// let envelope = Deadzones::new([0.0, 1.0], [1.0, -0.5], Reading::OneSided)?;
+/// let gpi = Gpi::new(envelope, PlayBank::new([0.0, 0.5], [1.0, 2.0])?);
+/// let creep = Lags::new([0.01], [0.2])?;
+/// let compensator = Compensator::new(gpi.inverse_within(-5.0, 5.0)?, creep.clone(), 2.0, 0.1)?;
+/// let mut state = compensator.standing_at(0.1);
+/// let (mut plays, mut lags) = (gpi.rest(), creep.rest());
+/// for reference in [0.5_f64, 3.0, 2.0, -1.0] {
+///     let v = gpi.step(&mut plays, compensator.step(&mut state, reference));
+///     assert!((2.0 * v + creep.step(&mut lags, v) + 0.1 - reference).abs() < 1e-14);
+/// }
+/// # Ok::<(), gpi_core::operators::OperatorError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Compensator<E: Storage, S, L> {
+    hysteresis: InverseGpi<E, S>,
+    creep: Lags<L>,
+    gain: E::Item,
+    offset: E::Item,
+}
+
+/// What a [`Compensator`] remembers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CompensatorState<S: Storage, L> {
+    /// Where the plays stand, and how many samples were out of reach.
+    pub hysteresis: InverseState<S>,
+    /// Where creep stands.
+    pub creep: LagsState<L>,
+    /// The last drive.
+    pub drive: S::Item,
+}
+
+impl<E, S, L> Compensator<E, S, L>
+where
+    E: Storage,
+    S: Storage<Item = E::Item>,
+    L: Storage<Item = E::Item>,
+{
+    /// From the inverse of the hysteresis, creep, the DC gain of the dynamics and the output at v = 0.
+    ///
+    /// # Errors
+    /// A gain of zero or one that is cancelled by creep; numbers that are not finite.
+    pub fn new(
+        hysteresis: InverseGpi<E, S>,
+        creep: Lags<L>,
+        gain: E::Item,
+        offset: E::Item,
+    ) -> Result<Self, OperatorError> {
+        require_finite("gain", &[gain])?;
+        require_finite("offset", &[offset])?;
+        let size = |value: E::Item| value.at_least(-value);
+        let largest = creep.gains().iter().fold(size(gain), |sum, &c| sum + size(c));
+        let compensator = Self { hysteresis, creep, gain, offset };
+        let slope = size(gain).at_most(size(compensator.standing_gain()));
+        if slope <= E::Item::EPSILON * largest {
+            let slope = slope.into();
+            return Err(OperatorError::NotRising { parameter: "gain", index: 0, slope });
+        }
+        Ok(compensator)
+    }
+
+    /// The inverse of the hysteresis.
+    pub fn hysteresis(&self) -> &InverseGpi<E, S> {
+        &self.hysteresis
+    }
+
+    /// Creep.
+    pub fn creep(&self) -> &Lags<L> {
+        &self.creep
+    }
+
+    /// The DC gain from v to the output, creep apart.
+    pub fn gain(&self) -> E::Item {
+        self.gain
+    }
+
+    /// The output at v = 0.
+    pub fn offset(&self) -> E::Item {
+        self.offset
+    }
+
+    /// From v to the output where all stands still.
+    fn standing_gain(&self) -> E::Item {
+        self.creep.gains().iter().fold(self.gain, |sum, &gain| sum + gain)
+    }
+
+    /// An actuator that was brought from zero to this reference long ago.
+    pub fn standing_at(&self, reference: E::Item) -> CompensatorState<S, L> {
+        let v = (reference - self.offset) / self.standing_gain();
+        let mut hysteresis = self.hysteresis.rest();
+        let (drive, reached) = self.hysteresis.step_reached(&mut hysteresis, v);
+        hysteresis.out_of_reach = 0;
+        CompensatorState { hysteresis, creep: self.creep.settled(reached), drive }
+    }
+}
+
+impl<E, S, L> Operator for Compensator<E, S, L>
+where
+    E: Storage,
+    S: Storage<Item = E::Item>,
+    L: Storage<Item = E::Item>,
+{
+    type Sample = E::Item;
+    type State = CompensatorState<S, L>;
+
+    /// The actuator at v = 0.
+    fn rest(&self) -> CompensatorState<S, L> {
+        self.standing_at(self.offset)
+    }
+
+    /// The drive u for a sample of the reference; one that is not finite holds the drive.
+    #[inline]
+    fn step(&self, state: &mut CompensatorState<S, L>, reference: E::Item) -> E::Item {
+        if reference.finite() {
+            let v = (reference - self.offset - self.creep.output(&state.creep)) / self.gain;
+            let (drive, reached) = self.hysteresis.step_reached(&mut state.hysteresis, v);
+            self.creep.advance(&mut state.creep, reached);
+            state.drive = drive;
+        }
+        state.drive
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
+
+    type Cascade = Gpi<[f64; 3], [f64; 3]>;
+
+    fn actuator() -> (Cascade, Lags<[f64; 2]>) {
+        let envelope =
+            Deadzones::new([-1.0, 0.0, 1.0], [0.5, 1.0, -0.4], Reading::OneSided).unwrap();
+        let plays = PlayBank::new([0.0, 0.3, 0.8], [1.0, 0.7, 0.4]).unwrap();
+        (Gpi::new(envelope, plays), Lags::new([0.02, 0.001], [0.1, 0.2]).unwrap())
+    }
+
+    fn references() -> impl Iterator<Item = f64> {
+        (0..3000).map(|k| 1.0 + 4.0 * (0.01 * f64::from(k)).sin() * (0.0007 * f64::from(k)).cos())
+    }
+
+    #[test]
+    fn creep_and_hysteresis_are_undone_to_rounding() {
+        let (gpi, creep) = actuator();
+        let compensator =
+            Compensator::new(gpi.inverse().unwrap(), creep.clone(), -0.5, 3.0).unwrap();
+        let mut state = compensator.standing_at(1.0);
+        let mut plays = gpi.rest();
+        let mut lags = creep.settled(gpi.step(&mut plays, state.drive));
+        for reference in references() {
+            let v = gpi.step(&mut plays, compensator.step(&mut state, reference));
+            let y = -0.5 * v + creep.step(&mut lags, v) + 3.0;
+            assert!((y - reference).abs() < 1e-12, "{y} {reference}");
+        }
+    }
+
+    #[test]
+    fn back_within_reach_it_follows_again() {
+        let (gpi, creep) = actuator();
+        let inverse = gpi.inverse_within(-1.0, 1.5).unwrap();
+        let compensator = Compensator::new(inverse, creep.clone(), 1.0, 0.0).unwrap();
+        let (mut state, mut plays, mut lags) = (compensator.rest(), gpi.rest(), creep.rest());
+        let mut missed = 0;
+        for reference in references() {
+            let u = compensator.step(&mut state, reference);
+            let v = gpi.step(&mut plays, u);
+            let y = v + creep.step(&mut lags, v);
+            if (y - reference).abs() > 1e-12 {
+                missed += 1;
+                assert!(u == -1.0 && y > reference || u == 1.5 && y < reference);
+            }
+        }
+        assert!((500..2500).contains(&missed), "{missed}");
+        assert_eq!(state.hysteresis.out_of_reach, missed);
+    }
+
+    #[test]
+    fn what_is_not_finite_holds_the_drive() {
+        let (gpi, creep) = actuator();
+        let compensator = Compensator::new(gpi.inverse().unwrap(), creep, 1.0, 0.0).unwrap();
+        let mut state = compensator.standing_at(0.5);
+        let drive = compensator.step(&mut state, 0.7);
+        let before = state.clone();
+        for reference in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(compensator.step(&mut state, reference), drive);
+        }
+        assert_eq!(state, before);
+    }
+
+    #[test]
+    fn without_a_gain_there_is_none() {
+        let (gpi, creep) = actuator();
+        let refused = |gain, offset| {
+            Compensator::new(gpi.inverse().unwrap(), creep.clone(), gain, offset).unwrap_err()
+        };
+        let is_none = |error| matches!(error, OperatorError::NotRising { parameter: "gain", .. });
+        assert!(is_none(refused(0.0, 0.0)) && is_none(refused(-0.3, 0.0)));
+        let expected = OperatorError::NotFinite { parameter: "offset", index: 0 };
+        assert_eq!(refused(1.0, f64::NAN), expected);
+    }
+}

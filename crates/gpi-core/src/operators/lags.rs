@@ -1,0 +1,136 @@
+//! First-order lags side by side: the memory of creep.
+
+use super::error::{require_finite, require_length};
+use super::storage::sum;
+use super::{Operator, OperatorError, Sample, Storage};
+
+/// What lags of unit DC gain add to the signal that drives them:
+/// `y(k) = sum_i c_i l_i(k)`, `l_i(k+1) = l_i(k) + (1 - a_i) (v(k) - l_i(k))`.
+///
+/// `a_i = exp(-T / T_i)` is the pole of a time constant T_i at the sampling interval T. A slow lag moves by less than
+/// the last digit of a number in single precision; the state therefore carries on what rounding took.
+///
+/// ```
+/// use gpi_core::operators::{Lags, Operator};
+/// let creep = Lags::new([0.5], [0.1])?;
+/// let mut state = creep.rest();
+/// assert_eq!([1.0, 1.0, 1.0].map(|v| creep.step(&mut state, v)), [0.0, 0.05, 0.1 * 0.75]);
+/// # Ok::<(), gpi_core::operators::OperatorError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lags<S> {
+    rates: S,
+    gains: S,
+}
+
+/// What [`Lags`] remember.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LagsState<S> {
+    /// l_i, in the unit of v.
+    pub lags: S,
+    /// What rounding has taken from them.
+    pub carried: S,
+}
+
+impl<S: Storage> Lags<S> {
+    /// Lags that move by `rates` `1 - a_i` of their distance a sample, with gains c_i.
+    ///
+    /// # Errors
+    /// Arrays of different length, elements that are not finite, negative rates.
+    pub fn new(rates: S, gains: S) -> Result<Self, OperatorError> {
+        require_length("gains", gains.values().len(), rates.values().len())?;
+        require_finite("rates", rates.values())?;
+        require_finite("gains", gains.values())?;
+        match rates.values().iter().position(|&rate| rate < S::Item::ZERO) {
+            Some(index) => Err(OperatorError::Negative { parameter: "rates", index }),
+            None => Ok(Self { rates, gains }),
+        }
+    }
+
+    /// `1 - a_i`.
+    pub fn rates(&self) -> &[S::Item] {
+        self.rates.values()
+    }
+
+    /// c_i.
+    pub fn gains(&self) -> &[S::Item] {
+        self.gains.values()
+    }
+
+    /// Where a constant v has brought them.
+    pub fn settled(&self, v: S::Item) -> LagsState<S> {
+        LagsState { lags: self.rates.filled(v), carried: self.rates.filled(S::Item::ZERO) }
+    }
+
+    /// y of the present sample, which does not depend on v of the same sample.
+    #[inline]
+    pub fn output(&self, state: &LagsState<S>) -> S::Item {
+        let gains = self.gains.values();
+        let lags = &state.lags.values()[..gains.len()];
+        sum(gains.len(), |i| gains[i] * lags[i])
+    }
+
+    /// Moves on by a sample.
+    #[inline]
+    pub fn advance(&self, state: &mut LagsState<S>, v: S::Item) {
+        let places = state.lags.values_mut().iter_mut().zip(state.carried.values_mut());
+        for (&rate, (lag, carried)) in self.rates.values().iter().zip(places) {
+            let wanted = rate * (v - *lag) + *carried;
+            let there = *lag + wanted;
+            *carried = wanted - (there - *lag);
+            *lag = there;
+        }
+    }
+}
+
+impl<S: Storage> Operator for Lags<S> {
+    type Sample = S::Item;
+    type State = LagsState<S>;
+
+    fn rest(&self) -> LagsState<S> {
+        self.settled(S::Item::ZERO)
+    }
+
+    #[inline]
+    fn step(&self, state: &mut LagsState<S>, v: S::Item) -> S::Item {
+        let output = self.output(state);
+        self.advance(state, v);
+        output
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_is_followed_exponentially() {
+        let lags = Lags::new([0.1, 0.004], [2.0, -1.0]).unwrap();
+        let mut state = lags.rest();
+        for k in 0..500 {
+            let expected = 2.0 * (1.0 - 0.9_f64.powi(k)) - (1.0 - 0.996_f64.powi(k));
+            assert!((lags.step(&mut state, 1.0) - expected).abs() < 1e-13);
+        }
+        assert_eq!(lags.output(&lags.settled(3.0)), 3.0);
+    }
+
+    #[test]
+    fn slow_lags_do_not_stand_still_in_single_precision() {
+        let slow = Lags::new([1e-6_f32], [1.0]).unwrap();
+        let mut state = slow.rest();
+        let mut last = 0.0;
+        for _ in 0..6_000_000 {
+            last = slow.step(&mut state, 1.0);
+        }
+        assert!((f64::from(last) - (1.0 - (-6.0_f64).exp())).abs() < 1e-6, "{last}");
+    }
+
+    #[test]
+    fn wrong_parameters_are_named() {
+        let expected = OperatorError::LengthMismatch { parameter: "gains", length: 0, expected: 1 };
+        assert_eq!(Lags::new(vec![0.1], vec![]).unwrap_err(), expected);
+        let expected = OperatorError::Negative { parameter: "rates", index: 1 };
+        assert_eq!(Lags::new([0.1, -0.1], [1.0, 1.0]).unwrap_err(), expected);
+        assert!(Lags::new([f64::NAN], [1.0]).is_err());
+    }
+}

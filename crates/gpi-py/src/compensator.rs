@@ -1,0 +1,167 @@
+//! The compensator of one sample at a time.
+
+use crate::arrays::from_vector;
+use crate::errors::{parameter, to_python};
+use crate::inverse_hysteresis::{InverseGpi, read, write};
+use crate::operators::channels;
+use gpi_core::compensate::StreamingCompensator;
+use gpi_core::operators::{CompensatorState, LagsState, Operator};
+use pyo3::prelude::*;
+
+type State = CompensatorState<Vec<f64>, Vec<f64>>;
+
+/// The drive for a reference, one sample after the other, see ``Model.compensator``.
+///
+/// ``u = D^-1[P^-1[v]]``, ``v = (r - offset - sum_i c_i l_i) / gain``, ``l_i(k+1) = l_i(k) + rate_i (v(k) - l_i(k))``:
+/// what the reference r, slow next to the dynamics, asks of hysteresis and creep. ``gpi export`` writes the same in C or
+/// in Rust.
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct Compensator {
+    found: StreamingCompensator,
+}
+
+#[pymethods]
+impl Compensator {
+    /// The inverse of the hysteresis.
+    #[getter]
+    fn hysteresis(&self) -> InverseGpi {
+        InverseGpi::new(self.found.compensator.hysteresis().clone())
+    }
+
+    /// DC gain from v to the output, creep apart, in the output's unit.
+    #[getter]
+    fn gain(&self) -> f64 {
+        self.found.compensator.gain()
+    }
+
+    /// The output at v = 0, in the output's unit.
+    #[getter]
+    fn offset(&self) -> f64 {
+        self.found.compensator.offset()
+    }
+
+    /// By how much of their distance to v the lags of creep move a sample, ``1 - exp(-1 / (T_i rate))``, shape (lags,).
+    #[getter]
+    fn creep_rates<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, self.found.compensator.creep().rates())
+    }
+
+    /// c_i of creep, in the output's unit, shape (lags,).
+    #[getter]
+    fn creep_gains<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, self.found.compensator.creep().gains())
+    }
+
+    /// Names of the parts of the model that the drive undoes.
+    #[getter]
+    fn compensated(&self) -> Vec<&'static str> {
+        self.found.compensated.clone()
+    }
+
+    /// Names of the parts that it does not undo, with the reason.
+    #[getter]
+    fn left(&self) -> Vec<(&'static str, &'static str)> {
+        self.found.left.clone()
+    }
+
+    /// The state of an actuator that was brought from zero to a reference long ago, for ``run``.
+    ///
+    /// Parameters
+    /// ----------
+    /// reference : float
+    ///     What the output stands at, in its unit.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (2 + plays + 2 lags,)
+    ///     The last drive, the number of samples out of reach, where plays and lags stand, what rounding took from the
+    ///     lags.
+    fn standing_at<'py>(&self, py: Python<'py>, reference: f64) -> PyResult<Bound<'py, PyAny>> {
+        if !reference.is_finite() {
+            return Err(parameter(format!("`reference` = {reference} must be a finite number")));
+        }
+        Ok(from_vector(py, &written(&self.found.compensator.standing_at(reference))))
+    }
+
+    /// The drive from a given state, and the state after the last sample.
+    ///
+    /// Parameters
+    /// ----------
+    /// reference : array_like, shape (samples,)
+    ///     What the output shall do, in its unit, at the model's rate; a sample that is not finite holds the drive.
+    /// state : array_like, shape (2 + plays + 2 lags,)
+    ///     As ``standing_at`` or the last call returned it.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray
+    ///     The drive, shape (samples,), in the input's unit, and the state.
+    fn run<'py>(
+        &self,
+        reference: &Bound<'py, PyAny>,
+        state: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let compensator = &self.found.compensator;
+        channels(
+            reference,
+            ("reference", self.length()),
+            Some(state),
+            |values| self.read(values),
+            |state, input, output| {
+                compensator.block(state, input, output);
+                written(state)
+            },
+        )
+    }
+
+    fn __repr__(&self) -> String {
+        let compensator = &self.found.compensator;
+        let [lower, upper] = compensator.hysteresis().drive();
+        format!(
+            "Compensator({} plays, {} lags, drive {lower} to {upper})",
+            compensator.hysteresis().plays().weights().len(),
+            compensator.creep().gains().len()
+        )
+    }
+}
+
+impl Compensator {
+    pub(crate) fn new(found: StreamingCompensator) -> Self {
+        Self { found }
+    }
+
+    fn length(&self) -> usize {
+        let compensator = &self.found.compensator;
+        2 + compensator.hysteresis().plays().weights().len() + 2 * compensator.creep().gains().len()
+    }
+
+    fn read(&self, values: &[f64]) -> PyResult<State> {
+        let compensator = &self.found.compensator;
+        if values.len() != self.length() {
+            let (found, expected) = (values.len(), self.length());
+            let message = format!(
+                "`state` has {found} elements, but {expected} are needed: take it from `standing_at` or `run`"
+            );
+            return Err(parameter(message));
+        }
+        let (hysteresis, creep) =
+            values[1..].split_at(self.length() - 1 - 2 * compensator.creep().gains().len());
+        let (lags, carried) = creep.split_at(creep.len() / 2);
+        Ok(State {
+            hysteresis: read(compensator.hysteresis(), hysteresis).map_err(to_python)?,
+            creep: LagsState { lags: lags.to_vec(), carried: carried.to_vec() },
+            drive: values[0],
+        })
+    }
+}
+
+/// The drive, the plays with their count, the lags and what they carry.
+fn written(state: &State) -> Vec<f64> {
+    let parts =
+        [&[state.drive], &write(&state.hysteresis)[..], &state.creep.lags, &state.creep.carried];
+    parts.concat()
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Compensator>()
+}

@@ -1,0 +1,208 @@
+//! The drive of u for a reference of y.
+//!
+//! Model: SHA-256 089f1aad1a22257d95d63013d78cd3c506e9470bd22007b8429d520f697149f1 of its file.
+//! Rate: 10000 samples a second.
+//! Reference: y in um.
+//! Drive: u in V, from -120 to 120 V.
+//! Undone: hysteresis, creep.
+//! Left: dynamics: of G only the DC gain is undone.
+//! Made by gpi-hammerstein 0.1.0, `gpi export`.
+
+#![forbid(unsafe_code)]
+
+/// The number type.
+pub type Real = f32;
+
+const PLAYS: usize = 8;
+const KNOTS: usize = 17;
+const LAGS: usize = 2;
+
+// v = (reference - offset - what creep adds) / gain
+const OFFSET: Real = 2.0;
+const GAIN: Real = 1.0;
+const STANDING_GAIN: Real = 1.08;
+
+// Creep: each lag moves by rate (v - lag) a sample, and adds gain times its place.
+const LAG_RATES: [Real; LAGS] = [0.0049875206, 0.00019998];
+const LAG_GAINS: [Real; LAGS] = [0.03, 0.05];
+
+// The inverse plays, from narrow to wide.
+const HALF_WIDTHS: [Real; PLAYS] = [0.0, 0.6, 1.62, 3.1, 5.075, 7.565, 11.005, 16.309];
+const WEIGHTS: [Real; PLAYS] = [
+    3.3333333,
+    -0.39215687,
+    -0.23847377,
+    -0.17105713,
+    -0.12200701,
+    -0.08405716,
+    -0.063137956,
+    -0.05005406,
+];
+
+// The inverse deadzones as a curve: knots, the drive at each, the slopes before the first one and behind each.
+const KNOT_PLACES: [Real; KNOTS] = [
+    -120.9, -106.05, -90.75, -75.6, -60.75, -45.3, -30.3, -15.0, 0.0, 15.0, 30.15, 45.75, 61.05,
+    76.65, 92.4, 107.7, 123.3,
+];
+const HEIGHTS: [Real; KNOTS] = [
+    -120.0, -105.0, -90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 60.0, 75.0,
+    90.0, 105.0, 120.0,
+];
+const SLOPES: [Real; KNOTS + 1] = [
+    0.990099, 1.010101, 0.98039216, 0.990099, 1.010101, 0.9708738, 1.0, 0.98039216, 1.0, 1.0,
+    0.990099, 0.96153843, 0.98039216, 0.96153843, 0.95238096, 0.98039216, 0.96153843, 0.95238096,
+];
+
+// The drive's limits, what goes into the deadzones there, and the v between which no limit is met.
+const LOWEST_DRIVE: Real = -120.0;
+const HIGHEST_DRIVE: Real = 120.0;
+const LOWEST: Real = -120.9;
+const HIGHEST: Real = 123.3;
+const SAFE_BELOW: Real = -52.8758;
+const SAFE_ABOVE: Real = 53.9606;
+
+/// From a reference to the drive, and what has to be remembered between two samples.
+#[derive(Clone, Debug)]
+pub struct Compensator {
+    plays: [Real; PLAYS],
+    lags: [Real; LAGS],
+    /// What rounding has taken from the lags.
+    carried: [Real; LAGS],
+    drive: Real,
+    out_of_reach: u32,
+}
+
+impl Compensator {
+    /// An actuator that was brought from zero to this reference in um long ago.
+    pub fn standing_at(reference: Real) -> Self {
+        let (lags, carried) = ([0.0; LAGS], [0.0; LAGS]);
+        let mut own = Self { plays: [0.0; PLAYS], lags, carried, drive: 0.0, out_of_reach: 0 };
+        let v = own.go_to((reference - OFFSET) / STANDING_GAIN);
+        own.lags = [v; LAGS];
+        own.out_of_reach = 0;
+        own
+    }
+
+    /// The drive in V for the next sample of the reference in um; one that is not finite holds the drive.
+    #[inline]
+    pub fn step(&mut self, reference: Real) -> Real {
+        if !reference.is_finite() {
+            return self.drive;
+        }
+        let mut creep = 0.0;
+        for (gain, lag) in LAG_GAINS.iter().zip(&self.lags) {
+            creep += gain * lag;
+        }
+        let v = self.go_to((reference - OFFSET - creep) / GAIN);
+        for (rate, (lag, carried)) in
+            LAG_RATES.iter().zip(self.lags.iter_mut().zip(&mut self.carried))
+        {
+            let wanted = rate * (v - *lag) + *carried;
+            let there = *lag + wanted;
+            *carried = wanted - (there - *lag);
+            *lag = there;
+        }
+        self.drive
+    }
+
+    /// Samples at which the drive stood at a limit.
+    pub fn out_of_reach(&self) -> u32 {
+        self.out_of_reach
+    }
+
+    /// Moves the plays to v, or to what is within reach of it, and sets the drive.
+    #[inline]
+    fn go_to(&mut self, v: Real) -> Real {
+        if !(SAFE_BELOW..=SAFE_ABOVE).contains(&v) {
+            return self.go_to_limit(v);
+        }
+        self.drive = drive_for(step_plays(&mut self.plays, v));
+        v
+    }
+
+    #[cold]
+    fn go_to_limit(&mut self, v: Real) -> Real {
+        let mut z = 0.0;
+        for i in 0..PLAYS {
+            z += WEIGHTS[i] * clamp(self.plays[i], v - HALF_WIDTHS[i], v + HALF_WIDTHS[i]);
+        }
+        let within = clamp(z, LOWEST, HIGHEST);
+        let mut reached = v;
+        if within != z {
+            reached = input_for(&self.plays, within);
+            self.out_of_reach = self.out_of_reach.saturating_add(1);
+        }
+        step_plays(&mut self.plays, reached);
+        self.drive = drive_for(within);
+        reached
+    }
+}
+
+#[inline]
+fn clamp(value: Real, low: Real, high: Real) -> Real {
+    let value = if high < value { high } else { value };
+    if low > value { low } else { value }
+}
+
+/// The first play, without width, stands at the last v: where v rises, no play falls.
+#[inline]
+fn step_plays(places: &mut [Real; PLAYS], v: Real) -> Real {
+    if v > places[0] {
+        sum(PLAYS, |i| {
+            let pushed = v - HALF_WIDTHS[i];
+            places[i] = if pushed > places[i] { pushed } else { places[i] };
+            WEIGHTS[i] * places[i]
+        })
+    } else {
+        sum(PLAYS, |i| {
+            let pushed = v + HALF_WIDTHS[i];
+            places[i] = if pushed < places[i] { pushed } else { places[i] };
+            WEIGHTS[i] * places[i]
+        })
+    }
+}
+
+#[inline]
+fn drive_for(z: Real) -> Real {
+    let passed = KNOT_PLACES.partition_point(|&knot| knot <= z);
+    let j = if passed > 0 && passed <= KNOTS { passed - 1 } else { 0 };
+    clamp(
+        HEIGHTS[j] + SLOPES[j + usize::from(passed > 0)] * (z - KNOT_PLACES[j]),
+        LOWEST_DRIVE,
+        HIGHEST_DRIVE,
+    )
+}
+
+/// Four sums side by side do not wait for each other.
+#[inline]
+fn sum(count: usize, mut term: impl FnMut(usize) -> Real) -> Real {
+    let mut sums = [0.0; 4];
+    let whole = count - count % 4;
+    for first in (0..whole).step_by(4) {
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum += term(first + i);
+        }
+    }
+    for i in whole..count {
+        sums[0] += term(i);
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
+/// The v that takes the plays from where they stand to an output.
+fn input_for(places: &[Real; PLAYS], output: Real) -> Real {
+    let (mut v, mut reached, mut slope) = (places[0], 0.0, 0.0);
+    for i in 0..PLAYS {
+        reached += WEIGHTS[i] * places[i];
+    }
+    let rises = output > reached;
+    for i in 0..PLAYS {
+        let turn = if rises { places[i] + HALF_WIDTHS[i] } else { places[i] - HALF_WIDTHS[i] };
+        let there = reached + slope * (turn - v);
+        if (rises && there > output) || (!rises && there < output) {
+            break;
+        }
+        (v, reached, slope) = (turn, there, slope + WEIGHTS[i]);
+    }
+    if slope > 0.0 { v + (output - reached) / slope } else { v }
+}

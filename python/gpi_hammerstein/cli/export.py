@@ -1,0 +1,57 @@
+"""`gpi export`: a compensator as source code."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.markup import escape
+
+from gpi_hammerstein import files
+from gpi_hammerstein._native import ParameterError
+from gpi_hammerstein.cli.compensate import read_pair
+from gpi_hammerstein.cli.output import console
+from gpi_hammerstein.cli.simulate import ModelFile
+from gpi_hammerstein.export import export_c, export_rust
+
+Rust = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Write a Rust module, such as compensator.rs.")
+]
+C = Annotated[Path | None, typer.Option("--c", metavar="DIR", help="Write NAME.h and NAME.c, in C99.")]
+Limits = Annotated[
+    str | None, typer.Option(metavar="LOW,HIGH", help="Lowest and highest drive, in the input's unit.")
+]
+PrecisionOption = Annotated[
+    Literal["single", "double"], typer.Option(help="The number type: float and f32, or double and f64.")
+]
+Name = Annotated[str, typer.Option(help="Begins the names of files, types and functions in C.")]
+
+
+def export(
+    model_file: ModelFile,
+    rust: Rust = None,
+    c: C = None,
+    limits: Limits = None,
+    precision: PrecisionOption = "single",
+    name: Name = "gpi_compensator",
+) -> None:
+    """Write a compensator for a microcontroller: from a reference to the drive, one sample after the other.
+
+    It undoes hysteresis and creep exactly, and of the dynamics their DC gain. The code needs no heap and no
+    library; the model's hash, units and limits are in its comments.
+    """
+    if rust is None and c is None:
+        raise ParameterError("nothing to write: name a file (--rust own.rs) or a folder (--c compensator)")
+    model = files.load_model(model_file)
+    pair = None if limits is None else read_pair(limits)
+    written = []
+    if rust is not None:
+        compensator = export_rust(model, rust, limits=pair, precision=precision)
+        written.append(rust)
+    if c is not None:
+        compensator = export_c(model, c, limits=pair, precision=precision, name=name)
+        written += [c / f"{name}.h", c / f"{name}.c"]
+    screen = console()
+    screen.print(f"Undone: {', '.join(compensator.compensated)}.")
+    for part, why in compensator.left:
+        screen.print(f"[yellow]left[/] {part}: {escape(why)}.")
+    screen.print("Written: " + ", ".join(escape(str(file)) for file in written))

@@ -1,0 +1,209 @@
+"""Compensators as source code, for microcontrollers.
+
+What is written holds the numbers of :meth:`Model.compensator` and needs nothing else: no heap, no library.
+"""
+
+import hashlib
+import os
+import re
+from importlib.resources import files as resources
+from string import Template
+from typing import Literal
+
+import numpy as np
+
+from gpi_hammerstein._native import Compensator, Model, ParameterError, __version__
+from gpi_hammerstein.files import staged, write_atomically
+
+__all__ = ["export_c", "export_rust"]
+
+Precision = Literal["single", "double"]
+
+
+def export_c(
+    model: Model,
+    folder: str | os.PathLike[str],
+    *,
+    limits: tuple[float, float] | None = None,
+    precision: Precision = "single",
+    name: str = "gpi_compensator",
+) -> Compensator:
+    """Write a compensator in C99: ``NAME.h`` and ``NAME.c``.
+
+    Parameters
+    ----------
+    model
+        A model of one input and one output.
+    folder
+        Where the two files go; it is made when it does not exist.
+    limits
+        Lowest and highest drive, in the input's unit.
+    precision
+        ``"single"`` for `float`, ``"double"`` for `double`.
+    name
+        Begins the names of files, types and functions, so that several fit into one program.
+
+    Returns
+    -------
+    Compensator
+        What the code computes.
+
+    Raises
+    ------
+    ParameterError
+        Limits that leave nothing, a hysteresis without an inverse, a name that C cannot have, a folder that
+        cannot be written.
+    DataError
+        Several inputs or outputs.
+
+    Examples
+    --------
+    >>> export_c(model, "firmware/compensator", limits=(-10.0, 150.0))  # doctest: +SKIP
+    """
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+        raise ParameterError(f"`name` = {name}: letters, digits and `_`, such as x_axis")
+    compensator = model.compensator(limits=limits)
+    real, largest, suffix = ("float", "FLT_MAX", "f") if precision == "single" else ("double", "DBL_MAX", "")
+    numbers = written_numbers(compensator, precision, largest, suffix)
+    numbers |= {"real": real, "largest": largest, "name": name, "NAME": name.upper()}
+    numbers |= described(model, compensator, " * ")
+    with staged(folder) as place:
+        for ending in ("h", "c"):
+            (place / f"{name}.{ending}").write_text(filled(f"compensator.{ending}", compensator, numbers))
+    return compensator
+
+
+def export_rust(
+    model: Model,
+    file: str | os.PathLike[str],
+    *,
+    limits: tuple[float, float] | None = None,
+    precision: Precision = "single",
+) -> Compensator:
+    """Write a compensator in Rust, one module without dependencies that builds with and without `std`.
+
+    Parameters
+    ----------
+    model
+        A model of one input and one output.
+    file
+        The file, such as ``src/compensator.rs``.
+    limits
+        Lowest and highest drive, in the input's unit.
+    precision
+        ``"single"`` for `f32`, ``"double"`` for `f64`.
+
+    Returns
+    -------
+    Compensator
+        What the code computes.
+
+    Raises
+    ------
+    ParameterError
+        Limits that leave nothing, a hysteresis without an inverse, a file that cannot be written.
+    DataError
+        Several inputs or outputs.
+
+    Examples
+    --------
+    >>> export_rust(model, "src/compensator.rs", precision="double")  # doctest: +SKIP
+    """
+    compensator = model.compensator(limits=limits)
+    real = "f32" if precision == "single" else "f64"
+    numbers = written_numbers(compensator, precision, "Real::INFINITY", "") | {"real": real}
+    numbers |= described(model, compensator, "//! ")
+    write_atomically(file, filled("compensator.rs", compensator, numbers))
+    return compensator
+
+
+def written_numbers(
+    compensator: Compensator, precision: Precision, infinity: str, suffix: str
+) -> dict[str, str]:
+    """Return every number that a template asks for, as shortly as it can be written without loss."""
+    if precision not in ("single", "double"):
+        raise ParameterError(f"`precision` = {precision}: single or double")
+    number = np.float32 if precision == "single" else np.float64
+
+    def written(value: float) -> str:
+        rounded = number(value)
+        if np.isinf(rounded):
+            return f"-{infinity}" if rounded < 0 else infinity
+        text = str(rounded)
+        return (text if "." in text or "e" in text else f"{text}.0") + suffix
+
+    def listed(values: np.ndarray) -> str:
+        lines = [", ".join(written(value) for value in values[i : i + 6]) for i in range(0, len(values), 6)]
+        return ",\n    ".join(lines) if len(lines) < 2 else "\n    " + ",\n    ".join(lines) + ",\n"
+
+    inverse = compensator.hysteresis
+    plays = inverse.plays
+    knots, heights, slopes = inverse.curve
+    arrays = {
+        "lag_rates": compensator.creep_rates,
+        "lag_gains": compensator.creep_gains,
+        "half_widths": plays.half_widths,
+        "weights": plays.weights,
+        "knots": knots,
+        "heights": heights,
+        "slopes": slopes,
+    }
+    pairs = {
+        ("lowest_drive", "highest_drive"): inverse.limits,
+        ("lowest", "highest"): inverse.reach,
+        ("safe_below", "safe_above"): inverse.safe,
+    }
+    scalars = {
+        "offset": compensator.offset,
+        "gain": compensator.gain,
+        "standing_gain": sum(compensator.creep_gains, start=compensator.gain),
+    }
+    for names, values in pairs.items():
+        scalars |= dict(zip(names, values, strict=True))
+    counts = {"plays": len(plays.weights), "knot_count": len(knots), "lags": len(compensator.creep_rates)}
+    return (
+        {key: listed(values) for key, values in arrays.items()}
+        | {key: written(value) for key, value in scalars.items()}
+        | {key: str(count) for key, count in counts.items()}
+    )
+
+
+def described(model: Model, compensator: Compensator, begin: str) -> dict[str, str]:
+    """Return the title, the facts as comments, and the units."""
+    input_unit, output_unit = model.input_units[0], model.output_units[0]
+    low, high = compensator.hysteresis.limits
+    between = "without limits" if np.isinf([low, high]).all() else f"from {low:g} to {high:g} {input_unit}"
+    facts = [
+        f"Model: SHA-256 {hashlib.sha256(model.to_json().encode()).hexdigest()} of its file.",
+        f"Rate: {model.rate:g} samples a second.",
+        f"Reference: {model.output_names[0]}{in_unit(output_unit)}.",
+        f"Drive: {model.input_names[0]}{in_unit(input_unit)}, {between}.",
+        f"Undone: {', '.join(compensator.compensated)}.",
+        *(f"Left: {part}: {why}." for part, why in compensator.left),
+        f"Made by gpi-hammerstein {__version__}, `gpi export`.",
+    ]
+    return {
+        "title": f"The drive of {model.input_names[0]} for a reference of {model.output_names[0]}",
+        "facts": "\n".join((begin + fact).rstrip() for fact in facts),
+        "input_unit": in_unit(input_unit),
+        "output_unit": in_unit(output_unit),
+    }
+
+
+def in_unit(unit: str) -> str:
+    """Return a unit as part of a sentence."""
+    return f" in {unit}" if unit else ""
+
+
+def filled(template: str, compensator: Compensator, values: dict[str, str]) -> str:
+    """Return a template with its values; lines from `@creep` on, up to `@else` or `@end`, are for creep."""
+    creeps = len(compensator.creep_rates) > 0
+    lines, wanted = [], True
+    text = resources("gpi_hammerstein.export").joinpath("templates", template).read_text(encoding="utf-8")
+    for line in text.splitlines(keepends=True):
+        mark = line.strip()
+        if mark in ("@creep", "@else", "@end"):
+            wanted = {"@creep": creeps, "@else": not creeps, "@end": True}[mark]
+        elif wanted:
+            lines.append(line)
+    return Template("".join(lines)).substitute(values)

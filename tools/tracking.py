@@ -1,0 +1,161 @@
+"""How well drives make a plant follow a reference that is not what was identified.
+
+A stage of the tests' simulator is identified; then every number of it is changed by up to 5 %, it gets
+creep and one more mode, and is to follow a triangle that decays. Four drives: in proportion to the
+reference, by the model of the stage as it was, by a model that is identified anew, and by that of
+`explain` on a record of the stage as it is. `--markdown` writes docs/tracking.md.
+"""
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "tests"))
+
+import gpi_hammerstein as gpi  # noqa: E402
+import plants  # noqa: E402  the simulator that the tests use
+from gpi_hammerstein.files import write_atomically  # noqa: E402
+from plants.excitation import Array, Experiment, stream  # noqa: E402
+
+SECONDS, RATE = 10.0, 2000.0
+PERTURBATION = 0.05
+LACKS = ("creep", "linear-dynamics")
+STRENGTH = 10.0
+REST, APPROACH = 0.1, 0.3  # seconds before the triangle
+LOW, HIGH = 0.2, 0.8  # of the stage's travel
+DRIVES = ("in proportion", "as it was", "identified anew", "after `explain`")
+HEAD = ["stage", *DRIVES, "gain", "explained by the change", "noise"]
+TEXT = """# Tracking
+
+Made by `make tracking`. A stage of the tests' simulator, which shares no code with the package, is
+identified from a record of {seconds:g} s. Then every number of it (travel, half-widths, weights,
+frequencies, damping) is changed by up to {perturbation:.0%}, and it gets creep and one more mode,
+each of {strength:g} times the noise. From rest it is to go to the middle of its range and to follow
+a triangle that decays, {turns} periods at a twentieth of the resonance. What it misses, rms in per
+cent of the reference's span, without the sensor's noise:
+
+{table}
+
+`in proportion`: a drive in proportion to the reference, between the extremes of the compensated
+one. `as it was`: `model.compensate` with the model of the stage before the change. `identified
+anew` and `after explain`: with models from one record of the changed stage, of `identify` and of
+`explain`. `gain`: the first over the last. `explained by the change`: how much of what the drive of
+the stage as it was misses is the difference between the two stages under that drive. `noise`: the
+sensor's, in the same per cent.
+"""
+TURNS = 6
+
+
+def changed(plant: plants.Plant, seed: int) -> plants.Plant:
+    """Change every number of a stage by up to 5 %."""
+    random = stream("perturbation", seed)
+
+    def near(values: Array) -> Array:
+        return values * (1 + PERTURBATION * random.uniform(-1, 1, np.shape(values)))
+
+    hysteresis, mechanics = plant.base.hysteresis, plant.base.mechanics
+    hysteresis = replace(
+        hysteresis,
+        travel=float(near(np.asarray(hysteresis.travel))),
+        half_widths=near(hysteresis.half_widths),
+        weights=near(hysteresis.weights),
+    )
+    modes = tuple(
+        replace(mode, hz=float(near(np.asarray(mode.hz))), damping=float(near(np.asarray(mode.damping))))
+        for mode in mechanics.modes
+    )
+    amplifier_hz = float(near(np.asarray(mechanics.amplifier_hz)))
+    mechanics = replace(mechanics, amplifier_hz=amplifier_hz, modes=modes)
+    plant.base = replace(plant.base, hysteresis=hysteresis, mechanics=mechanics)
+    return plant
+
+
+def recorded(plant: plants.Plant, seed: int) -> gpi.Record:
+    """Run an experiment on a stage."""
+    own = plant.record(seed)
+    return gpi.Record(own.u, own.y, own.rate)
+
+
+def output(plant: plants.Plant, drive: Array, lead: int) -> Array:
+    """What a stage does under a drive, without noise, from the reference's first sample on."""
+    noise, plant.noise_std = plant.noise_std, 0.0
+    try:
+        return plant.simulate(Experiment(drive, RATE, lead, (0, 0)), plant.strengths)
+    finally:
+        plant.noise_std = noise
+
+
+def reference(plant: plants.Plant) -> Array:
+    """From rest to the middle of the travel, then a triangle that decays at a twentieth of the resonance."""
+    frequency = plant.resonance_hz / 20
+    t = np.arange(round(TURNS * RATE / frequency)) / RATE
+    triangle = np.interp(t * frequency % 1.0, [0, 0.25, 0.75, 1], [0, 1, -1, 0]) * (1 - t / t[-1])
+    middle, half = 0.5 * (LOW + HIGH), 0.5 * (HIGH - LOW)
+    approach = np.sin(np.linspace(0, np.pi / 2, round(APPROACH * RATE))) ** 2
+    shares = [np.zeros(round(REST * RATE)), middle * approach, middle + half * triangle]
+    return plant.base.offset + plant.base.hysteresis.travel * np.concatenate(shares)
+
+
+def track(seed: int) -> list[float]:
+    """Return the errors of all drives, their ratio, the share that the change explains, and the noise."""
+    before = plants.draw(seed, (), seconds=SECONDS, rate=RATE)
+    before.in_motion = False
+    after = plants.draw(seed, LACKS, STRENGTH, seconds=SECONDS, rate=RATE)
+    after.in_motion = False
+    before.noise_std = after.noise_std
+    wanted, limits = reference(before), (0.0, before.base.hysteresis.volts)
+    record = recorded(before, 1)
+    after = changed(after, seed)
+    anew = recorded(after, 2)
+    span = np.ptp(wanted)
+
+    def missed(plant: plants.Plant, drive: Array, lead: int) -> Array:
+        return wanted - output(plant, drive, lead)
+
+    def rms(error: Array) -> float:
+        return float(100 * np.sqrt(np.mean(error**2)) / span)
+
+    old = gpi.identify(record).compensate(wanted, limits=limits)
+    low, high = old.drive.min(), old.drive.max()
+    line = low + (high - low) * (wanted - wanted.min()) / span
+    errors = [rms(missed(after, line, 0)), rms(missed(after, old.drive, old.lead))]
+    for model in (gpi.identify(anew), gpi.explain(anew).model):
+        found = model.compensate(wanted, limits=limits)
+        errors.append(rms(missed(after, found.drive, found.lead)))
+    error = missed(after, old.drive, old.lead)
+    own = missed(before, old.drive, old.lead)
+    share = 1 - np.mean(own**2) / np.mean(error**2)
+    return [*errors, errors[0] / errors[-1], 100 * share, 100 * after.noise_std / span]
+
+
+def main() -> None:
+    """Track on some stages, and print or write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--stages", type=int, default=8)
+    parser.add_argument("--markdown", type=Path, help="write the table there")
+    arguments = parser.parse_args()
+    rows = []
+    for seed in range(arguments.stages):
+        rows.append(track(seed))
+        print(seed, " ".join(f"{value:.3g}" for value in rows[-1]), flush=True)
+    texts = [[str(seed), *(f"{value:.3g}" for value in row)] for seed, row in enumerate(rows)]
+    texts.append(["median", *(f"{value:.3g}" for value in np.median(rows, axis=0))])
+    lines = [HEAD, ["---"] * len(HEAD), *texts]
+    page = TEXT.format(
+        seconds=SECONDS,
+        perturbation=PERTURBATION,
+        strength=STRENGTH,
+        turns=TURNS,
+        table="\n".join(f"| {' | '.join(line)} |" for line in lines),
+    )
+    if arguments.markdown is None:
+        print(page)
+    else:
+        write_atomically(arguments.markdown, page)
+
+
+if __name__ == "__main__":
+    main()
