@@ -9,6 +9,7 @@ import scipy.signal
 import gpi_hammerstein as gpi
 import plants
 from gpi_hammerstein.explanation import in_words
+from records import actuator, drive
 
 SECONDS, RATE = 10.0, 1000.0
 
@@ -64,6 +65,18 @@ def test_a_clean_record_lacks_nothing(seed):
     assert found.verdict == "explained" or seed == 1
     lacks_nothing = next(iter(in_words(found.to_dict()))).startswith("The model lacks nothing")
     assert lacks_nothing == (found.verdict == "explained")
+
+
+@pytest.mark.parametrize(("frequency", "amplitude"), [(50.3, 0.05), (50.0, 0.01), (60.7, 0.01)])
+def test_a_hum_is_no_mode_that_rings_on(frequency, amplitude):
+    # a mode that rings longer than the record follows a hum from where it began
+    u = drive()
+    hum = amplitude * np.sin(2 * np.pi * frequency * np.arange(len(u)) / 1000.0)
+    found = gpi.explain(gpi.Record(u, actuator(u) + hum, 1000.0))
+    assert found.effects == ["periodic-disturbance"] and found.verdict == "explained"
+    values = {row["name"]: row["value"] for row in found.steps[1]["parameters"]}
+    assert values["frequency"] == pytest.approx(frequency, abs=0.05)
+    assert values["amplitude"] == pytest.approx(amplitude, rel=0.05)
 
 
 def test_loops_that_open_with_speed_are_fitted_on_grids_that_move():

@@ -140,7 +140,9 @@ impl<'a> Search<'a> {
             rescale(&mut other);
             let better = self.offer(other, progress)?;
             gained |= better;
-            missed = if better { 0 } else { missed + 1 };
+            // with more states than the actuator has, all may ring on with a hum
+            let any = self.refined.iter().any(|(refined, _)| self.is_usable(refined));
+            missed = if better || !any { 0 } else { missed + 1 };
             // An odd order may be a bad one between two good ones.
             if missed == 2 {
                 break;
