@@ -57,9 +57,10 @@ from gpi_hammerstein.export import export_c, export_rust
 from gpi_hammerstein.files import load_model as load
 from gpi_hammerstein.files import save_model as save
 from gpi_hammerstein.io import read_record
+from gpi_hammerstein.pickling import register
 
 if TYPE_CHECKING:
-    from gpi_hammerstein import plot
+    from gpi_hammerstein import interop, plot
 
 __all__ = [
     "Compensation",
@@ -93,6 +94,7 @@ __all__ = [
     "fir",
     "fit_hysteresis",
     "identify",
+    "interop",
     "load",
     "multisine",
     "plot",
@@ -104,11 +106,13 @@ __all__ = [
     "sensitivities",
 ]
 
+register()
+
 
 def __getattr__(name: str) -> Any:
-    """Load `plot`, and with it Matplotlib, when it is first used."""
-    if name == "plot":
+    """Load `plot`, and with it Matplotlib, and `interop` when they are first used."""
+    if name in ("plot", "interop"):
         import importlib
 
-        return importlib.import_module("gpi_hammerstein.plot")
+        return importlib.import_module(f"gpi_hammerstein.{name}")
     raise AttributeError(f"module `gpi_hammerstein` has no attribute `{name}`")

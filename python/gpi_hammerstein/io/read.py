@@ -4,12 +4,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from gpi_hammerstein._native import DataError, ParameterError, Record
 from gpi_hammerstein.io.arrays import read_mat, read_npy_pair, read_npz
 from gpi_hammerstein.io.clock import resample as put_on_grid
 from gpi_hammerstein.io.clock import uniform_rate
 from gpi_hammerstein.io.columns import TIME_UNITS, Column, Roles, assign_roles
+from gpi_hammerstein.io.frames import Frame, is_frame, read_frame
 from gpi_hammerstein.io.recording import Recording, Run
 from gpi_hammerstein.io.tables import Table, read_csv, read_parquet
 
@@ -18,7 +20,7 @@ Names = str | Sequence[str]
 
 
 def read_record(
-    path: PathLike | Sequence[PathLike],
+    path: PathLike | Frame | Sequence[PathLike | Frame],
     *,
     input: Names | None = None,
     output: Names | None = None,
@@ -38,7 +40,8 @@ def read_record(
         CSV (``.csv``, ``.csv.gz``, also semicolon or tab separated), Parquet (``.parquet``), NumPy
         (``.npz``, ``.npy``), MATLAB v5 or v7.3 (``.mat``). Arrays in the last two are (samples,),
         (samples, channels), (samples, channels, realisations) or (samples, channels, realisations,
-        periods): every realisation is an experiment whose periods but the last are warm-up.
+        periods): every realisation is an experiment whose periods but the last are warm-up. Or a data
+        frame of Polars or pandas, or an xarray dataset, with columns named as in a CSV file.
     input, output, covariate
         Names of the columns with or without their unit: ``"u_V"`` or ``"u"``. What is not given is
         found: inputs ``u``, ``u1``, ``input``; outputs ``y``, ``y1``, ``output``; every other column is a
@@ -93,7 +96,7 @@ def read_record(
 
 
 def read_recording(
-    path: PathLike | Sequence[PathLike],
+    path: PathLike | Frame | Sequence[PathLike | Frame],
     *,
     input: Names | None = None,
     output: Names | None = None,
@@ -132,14 +135,17 @@ def read_recording(
         raise ParameterError("`rate` and `resample` exclude each other: resampling needs the time stamps")
     if warmup is not None and warmup < 0:
         raise ParameterError(f"`warmup` = {warmup}: must be zero or a number of samples")
-    paths = [Path(path)] if isinstance(path, str | os.PathLike) else [Path(one) for one in path]
-    if not paths:
+    given: list[Any] = [path] if is_frame(path) or isinstance(path, str | os.PathLike) else [*path]
+    sources = [one if is_frame(one) else Path(one) for one in given]
+    if not sources:
         raise ParameterError("`path`: no file is named; name at least one record")
-    output_files = _output_files(paths, _names(output))
+    output_files = _output_files([one for one in sources if isinstance(one, Path)], _names(output))
     parts = []
-    for one in paths:
+    for one in sources:
         outputs = _names(output)
-        if output_files:
+        if is_frame(one):
+            tables = [read_frame(one)]
+        elif output_files:
             tables, outputs = read_npy_pair(one, output_files.get(one)), None
         else:
             tables = _read_tables(one)
@@ -154,7 +160,8 @@ def read_recording(
                 need_time=rate is None and table.rate is None,
             )
             parts.append(_read_part(table, roles, rate, resample, warmup))
-    return _join(parts, [str(one) for one in paths]).select(experiment)
+    names = [str(one) if isinstance(one, Path) else "the data frame" for one in sources]
+    return _join(parts, names).select(experiment)
 
 
 def _names(names: Names | None) -> list[str] | None:

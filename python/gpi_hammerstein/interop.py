@@ -1,0 +1,220 @@
+"""To and from the packages that are used beside this one: python-control, SciPy, Polars, pandas, xarray.
+
+None of them but SciPy and Polars is a dependency; each is imported where it is needed.
+"""
+
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from gpi_hammerstein._native import ParameterError, Record, StateSpace
+
+__all__ = ["from_control", "from_dlti", "to_control", "to_dlti", "to_pandas", "to_polars", "to_xarray"]
+
+
+def to_control(system: StateSpace, rate: float) -> Any:
+    """Return a linear part as a ``control.StateSpace``.
+
+    Parameters
+    ----------
+    system
+        Such as ``model.linear``.
+    rate
+        Sampling rate in Hz.
+
+    Returns
+    -------
+    control.StateSpace
+        Of the sampling time ``1 / rate``.
+
+    Examples
+    --------
+    >>> gpi.interop.to_control(model.linear, model.rate).damp()  # doctest: +SKIP
+    """
+    import control
+
+    return control.ss(system.A, system.B, system.C, system.D, 1 / rate)
+
+
+def from_control(system: Any) -> StateSpace:
+    """Return a linear system of python-control.
+
+    Parameters
+    ----------
+    system
+        A discrete-time ``control.StateSpace`` or ``control.TransferFunction``.
+
+    Returns
+    -------
+    StateSpace
+        The same system; its sampling time is ``system.dt``.
+
+    Raises
+    ------
+    ParameterError
+        A continuous-time system.
+
+    Examples
+    --------
+    >>> gpi.interop.from_control(control.sample_system(plant, 1e-3))  # doctest: +SKIP
+    """
+    import control
+
+    if system.dt == 0:
+        raise ParameterError("`system` is in continuous time; sample it first (control.sample_system)")
+    own = control.ss(system)
+    return StateSpace(own.A, own.B, own.C, own.D)
+
+
+def to_dlti(system: StateSpace, rate: float) -> Any:
+    """Return a linear part as a ``scipy.signal.dlti``.
+
+    Parameters
+    ----------
+    system
+        Such as ``model.linear``.
+    rate
+        Sampling rate in Hz.
+
+    Returns
+    -------
+    scipy.signal.dlti
+        In state space, of the sampling time ``1 / rate``.
+
+    Examples
+    --------
+    >>> gpi.interop.to_dlti(gpi.StateSpace([[0.5]], [[1.0]], [[0.5]], [[0.0]]), 1e3).dt
+    0.001
+    """
+    import scipy.signal
+
+    return scipy.signal.dlti(system.A, system.B, system.C, system.D, dt=1 / rate)
+
+
+def from_dlti(system: Any) -> StateSpace:
+    """Return a discrete-time linear system of SciPy.
+
+    Parameters
+    ----------
+    system
+        A ``scipy.signal.dlti`` in any form.
+
+    Returns
+    -------
+    StateSpace
+        The same system; its sampling time is ``system.dt``.
+
+    Raises
+    ------
+    ParameterError
+        A continuous-time system.
+
+    Examples
+    --------
+    >>> import scipy.signal
+    >>> gpi.interop.from_dlti(scipy.signal.dlti([0.5], [1.0, -0.5], dt=1e-3)).dc_gain.item()
+    1.0
+    """
+    if system.dt is None:
+        raise ParameterError("`system` is in continuous time; make it discrete first (system.to_discrete)")
+    own = system.to_ss()
+    return StateSpace(own.A, own.B, own.C, own.D)
+
+
+def columns(record: Record, experiment: int) -> dict[str, tuple[str, Any]]:
+    """Return unit and samples of every channel by its name, time first."""
+    u, y = record.u[experiment], record.y[experiment]
+    found: dict[str, tuple[str, Any]] = {"t": ("s", np.arange(len(u)) / record.rate)}
+    groups = [
+        (record.input_names, record.input_units, u),
+        (record.output_names, record.output_units, y),
+    ]
+    if record.covariate_names:
+        covariates = record.covariates[experiment]
+        groups.append((record.covariate_names, record.covariate_units, covariates))
+    for names, units, signals in groups:
+        found |= {name: (unit, signal) for name, unit, signal in zip(names, units, signals.T, strict=True)}
+    return found
+
+
+def headed(record: Record, experiment: int) -> dict[str, Any]:
+    """Return the samples of every channel by its header."""
+    found = columns(record, experiment)
+    return {f"{name} [{unit}]" if unit else name: signal for name, (unit, signal) in found.items()}
+
+
+def to_polars(record: Record, experiment: int = 0) -> pl.DataFrame:
+    """Return an experiment as a Polars data frame.
+
+    Parameters
+    ----------
+    record
+        What was measured.
+    experiment
+        Which one, counted from 0.
+
+    Returns
+    -------
+    polars.DataFrame
+        ``t [s]`` and the channels, with their units in brackets, as `read_record` reads them.
+
+    Examples
+    --------
+    >>> record = gpi.Record([0.0, 1.0], [0.0, 2.0], 10.0, input_units=["V"])
+    >>> gpi.interop.to_polars(record).columns
+    ['t [s]', 'u [V]', 'y']
+    """
+    return pl.DataFrame(headed(record, experiment))
+
+
+def to_pandas(record: Record, experiment: int = 0) -> Any:
+    """Return an experiment as a pandas data frame.
+
+    Parameters
+    ----------
+    record
+        What was measured.
+    experiment
+        Which one, counted from 0.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``t [s]`` and the channels, with their units in brackets.
+
+    Examples
+    --------
+    >>> gpi.interop.to_pandas(record).plot(x="t [s]")  # doctest: +SKIP
+    """
+    import pandas as pd
+
+    return pd.DataFrame(headed(record, experiment))
+
+
+def to_xarray(record: Record, experiment: int = 0) -> Any:
+    """Return an experiment as an xarray dataset over ``t``.
+
+    Parameters
+    ----------
+    record
+        What was measured.
+    experiment
+        Which one, counted from 0.
+
+    Returns
+    -------
+    xarray.Dataset
+        One variable a channel, its unit in ``attrs["units"]``.
+
+    Examples
+    --------
+    >>> gpi.interop.to_xarray(record)["y"].attrs  # doctest: +SKIP
+    {'units': 'um'}
+    """
+    import xarray as xr
+
+    found = columns(record, experiment)
+    unit, t = found.pop("t")
+    variables = {name: ("t", signal, {"units": unit}) for name, (unit, signal) in found.items()}
+    return xr.Dataset(variables, coords={"t": ("t", t, {"units": unit})})
