@@ -70,7 +70,7 @@ def to_dict(found: Explanation) -> dict[str, Any]:
     }
 
 
-def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
+def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True) -> Iterator[str]:
     """Yield sentences that say what an explanation found.
 
     Parameters
@@ -79,6 +79,8 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
         What `to_dict` returned.
     unit
         The unit of the outputs.
+    numbers
+        Whether a sentence names the parameters of each effect.
 
     Yields
     ------
@@ -111,14 +113,14 @@ def in_words(result: Mapping[str, Any], unit: str = "") -> Iterator[str]:
             f"({before / max(after, 1e-300):.3g} times)."
         )
     shown: set[str] = set()
-    for step in result["steps"]:
+    for step in result["steps"] if numbers else []:
         name = step["effect"]
         if name is None or not step["parameters"]:
             continue
-        numbers = [number(label, row) for label, row in step["parameters"].items()]
-        if len(numbers) > SHOWN:
-            numbers[SHOWN:] = [f"{len(numbers) - SHOWN} more"]
-        yield f"{name} ({'one more' if name in shown else names[name]}): {', '.join(numbers)}."
+        values = [number(label, row) for label, row in step["parameters"].items()]
+        if len(values) > SHOWN:
+            values[SHOWN:] = [f"{len(values) - SHOWN} more"]
+        yield f"{name} ({'one more' if name in shown else names[name]}): {', '.join(values)}."
         shown.add(name)
     if result["moved_resonance"]:
         small, large = result["moved_resonance"]

@@ -68,6 +68,9 @@ def test_given_axes_are_drawn_on_and_returned(record: gpi.Record, model: gpi.Mod
         lambda ax: gpi.plot.residual_in_time(left, ax),
         lambda ax: gpi.plot.residual_spectrum(left, ax),
         lambda ax: gpi.plot.residual_over_input(left, ax),
+        lambda ax: gpi.plot.residual_over_speed(left, ax),
+        lambda ax: gpi.plot.response(model, ax),
+        lambda ax: gpi.plot.record(record, ax),
     ):
         ax = figure.add_subplot()
         assert draw(ax) is ax
@@ -83,6 +86,10 @@ def test_without_axes_a_figure_is_made(record: gpi.Record, model: gpi.Model) -> 
         gpi.fir(u, record.y[0], 31).plot(),
         model.linear.plot(),
         model.plot(record),
+        record.plot(),
+        model.refinement.plot(),
+        model.identification.plot(),
+        model.compensate(record.y[0][:, 0]).plot(),
     ]
     assert all(isinstance(ax, Axes) and ax.lines for ax in axes)
     assert len(plt.get_fignums()) == len(axes)

@@ -28,7 +28,8 @@ NAMES = [
     "higher-order",
     "outliers",
 ]
-PICTURES = {f"residual_{kind}.png" for kind in ("time", "spectrum", "over_input", "autocorrelation")}
+KINDS = ("time", "spectrum", "over_input", "over_speed", "autocorrelation")
+PICTURES = {f"residual_{kind}.png" for kind in KINDS}
 
 
 def written_by_hand(pole: float = 0.7, half_width: float = 0.8) -> dict[str, Any]:

@@ -3,6 +3,8 @@
 use crate::arrays::{from_signal, from_vector, signal};
 use crate::errors::{parameter, to_python};
 use crate::model::figures;
+use crate::plotting::plot;
+use gpi_core::Channel;
 use gpi_core::compensate::{CompensateOptions, Compensation as Found};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -12,6 +14,7 @@ use pyo3::types::PyDict;
 pub(crate) struct Compensation {
     found: Found,
     rate: f64,
+    outputs: Vec<Channel>,
     one_dimensional: bool,
 }
 
@@ -24,6 +27,18 @@ impl Compensation {
         let rows = self.found.drive.nrows();
         let time: Vec<f64> = (0..rows).map(|k| (k as f64 - lead) / self.rate).collect();
         from_vector(py, &time)
+    }
+
+    /// Names of the outputs.
+    #[getter]
+    fn output_names(&self) -> Vec<String> {
+        self.outputs.iter().map(|channel| channel.name.clone()).collect()
+    }
+
+    /// Units of the outputs.
+    #[getter]
+    fn output_units(&self) -> Vec<String> {
+        self.outputs.iter().map(|channel| channel.unit.clone()).collect()
     }
 
     /// u, shape (lead + samples,) or (lead + samples, inputs), in the inputs' units.
@@ -98,6 +113,15 @@ impl Compensation {
         self.found.left.clone()
     }
 
+    /// Draws the predicted output over the reference; see ``gpi_hammerstein.plot.compensation``.
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        plot("compensation", slf.as_any(), ax)
+    }
+
     fn __repr__(&self) -> String {
         let (error, before) = (self.found.error.rms, self.found.error_in_proportion.rms);
         format!(
@@ -116,7 +140,8 @@ pub(crate) fn compensate(
 ) -> PyResult<Compensation> {
     let (reference, one_dimensional) = signal("reference", reference)?;
     let found = py.detach(|| model.compensate(&reference, options)).map_err(to_python)?;
-    Ok(Compensation { found, rate: model.rate(), one_dimensional })
+    let outputs = model.outputs().to_vec();
+    Ok(Compensation { found, rate: model.rate(), outputs, one_dimensional })
 }
 
 /// A pair of limits for all inputs, or a list of pairs.

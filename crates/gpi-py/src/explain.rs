@@ -4,6 +4,7 @@ use crate::arrays::from_matrix;
 use crate::identify::{grid, interruptible_in_part};
 use crate::model::Model;
 use crate::operators::read_reading;
+use crate::plotting::{in_notebook, plot};
 use crate::record::Record;
 use crate::refine::Refinement;
 use crate::residual::test_rows;
@@ -210,6 +211,55 @@ impl Explanation {
     fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let module = slf.py().import("gpi_hammerstein.explanation")?;
         module.call_method1("to_dict", (slf,))
+    }
+
+    /// Samples at the start of each experiment that the fit could not use.
+    #[getter]
+    fn warmups(&self) -> Vec<usize> {
+        self.found.warmups.clone()
+    }
+
+    /// Writes one HTML page with all of it, which needs no network and nothing else.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     The file, such as ``report.html``.
+    /// command : str, optional
+    ///     The command that made it, for the foot of the page.
+    /// notes : sequence of str
+    ///     What was done to the samples on the way in.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     The folder does not exist or cannot be written.
+    #[pyo3(signature = (path, *, command = None, notes = vec![]))]
+    fn report(
+        slf: &Bound<'_, Self>,
+        path: &Bound<'_, PyAny>,
+        command: Option<String>,
+        notes: Vec<String>,
+    ) -> PyResult<()> {
+        let options = PyDict::new(slf.py());
+        options.set_item("command", command)?;
+        options.set_item("notes", notes)?;
+        let module = slf.py().import("gpi_hammerstein.report")?;
+        module.call_method("write_report", (slf, path), Some(&options))?;
+        Ok(())
+    }
+
+    /// Draws measured and simulated output over the input; see ``gpi_hammerstein.plot.loops``.
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        plot("loops", slf.as_any(), ax)
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        in_notebook("explanation", slf.as_any())
     }
 
     fn __repr__(&self) -> String {

@@ -2,6 +2,7 @@
 
 use crate::arrays::from_vector;
 use crate::fir::Fir;
+use crate::plotting::plot;
 use gpi_core::identify as core;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -88,6 +89,15 @@ impl Identification {
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.found.notes.clone()
+    }
+
+    /// Draws the structures that were compared; see ``gpi_hammerstein.plot.candidates``.
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        plot("candidates", slf.as_any(), ax)
     }
 
     fn __repr__(&self) -> String {

@@ -7,6 +7,7 @@ use crate::errors::{parameter, to_python};
 use crate::identification::Identification;
 use crate::identify::interruptible;
 use crate::operators::{Gpi, read_state, write_state};
+use crate::plotting::in_notebook;
 use crate::record::{Record, names, units};
 use crate::refine::Refinement;
 use crate::state_space::StateSpace;
@@ -391,6 +392,10 @@ impl Model {
         options.set_item("ax", ax)?;
         let module = slf.py().import("gpi_hammerstein.plot")?;
         module.call_method("fit", (slf, record), Some(&options))
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        in_notebook("model", slf.as_any())
     }
 
     fn __repr__(&self) -> String {

@@ -2,6 +2,7 @@
 
 use crate::arrays::{experiments, from_matrix, vector};
 use crate::errors::{parameter, to_python};
+use crate::plotting::{in_notebook, plot};
 use gpi_core::{Channel, Experiment, Matrix, TimeAxis};
 use pyo3::prelude::*;
 
@@ -211,6 +212,19 @@ impl Record {
     fn split(&self, fraction: f64) -> PyResult<(Self, Self)> {
         let (first, rest) = self.record.split(fraction).map_err(to_python)?;
         Ok((Self { record: first }, Self { record: rest }))
+    }
+
+    /// Draws inputs and outputs over time; see ``gpi_hammerstein.plot.record``.
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        plot("record", slf.as_any(), ax)
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        in_notebook("record", slf.as_any())
     }
 
     fn __repr__(&self) -> String {

@@ -6,6 +6,7 @@ use crate::arrays::{
 use crate::errors::to_python;
 use crate::identify::interruptible;
 use crate::model::Model;
+use crate::plotting::plot;
 use crate::record::Record;
 use gpi_core::Matrix;
 use gpi_core::identify::{self as core, NoiseMethod, RefineOptions};
@@ -150,6 +151,15 @@ impl Refinement {
         let (input, one_dimensional) = signal("u", u)?;
         let found = self.refinement.loop_deviations(&input).map_err(to_python)?;
         Ok(from_signal(u.py(), found, one_dimensional))
+    }
+
+    /// Draws the residual over the steps; see ``gpi_hammerstein.plot.history``.
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        plot("history", slf.as_any(), ax)
     }
 
     fn __repr__(&self) -> String {

@@ -1,6 +1,7 @@
 """The command `gpi`."""
 
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -15,6 +16,7 @@ from gpi_hammerstein.cli.explain import explain
 from gpi_hammerstein.cli.export import export
 from gpi_hammerstein.cli.identify import identify
 from gpi_hammerstein.cli.output import complain
+from gpi_hammerstein.cli.report import report
 from gpi_hammerstein.cli.reproduce import reproduce
 from gpi_hammerstein.cli.simulate import simulate
 from gpi_hammerstein.cli.validate import validate
@@ -47,7 +49,7 @@ def _options(
     pass
 
 
-for command in (demo, identify, explain, simulate, validate, compensate, export):
+for command in (demo, identify, explain, report, simulate, validate, compensate, export):
     app.command()(command)
 app.add_typer(excite, name="excite")
 app.add_typer(reproduce, name="reproduce")
@@ -72,7 +74,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     3
     """
     try:
-        code = app(args=None if arguments is None else list(arguments), standalone_mode=False)
+        words = sys.argv[1:] if arguments is None else list(arguments)
+        code = app(args=words, standalone_mode=False, obj=shlex.join(["gpi", *words]))
         return code if isinstance(code, int) else DONE
     except ParameterError as error:
         return complain(error, WRONG_CALL)

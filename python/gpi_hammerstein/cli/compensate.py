@@ -124,7 +124,7 @@ def compensate(
         with files.staged(out) as folder:
             drive_table(model, found).write_csv(folder / WRITTEN[0], float_precision=None)
             write_json(result, folder / WRITTEN[1])
-            picture(folder / WRITTEN[2], lambda ax: compensation(model, found, ax), 6.0, 6.0)
+            picture(folder / WRITTEN[2], lambda ax: compensation(found, ax), 6.0, 6.0)
     if as_json:
         print_json(result)
         return

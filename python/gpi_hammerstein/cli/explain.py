@@ -27,11 +27,13 @@ from gpi_hammerstein.cli.output import (
 )
 from gpi_hammerstein.cli.residual import name_pictures, write_residual_pictures
 from gpi_hammerstein.explanation import in_words, to_dict
+from gpi_hammerstein.io import Recording
 
 MODEL = "Model"
 
 
 def explain(
+    context: typer.Context,
     records: options.Records,
     input: options.Input = None,
     output: options.Output = None,
@@ -79,6 +81,9 @@ def explain(
         typer.Option(help="Deadzones: of u alone, or of its direction too.", rich_help_panel=MODEL),
     ] = "one-sided",
     out: options.Out = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write report.html, one page with all of it, to DIR too.")
+    ] = False,
     as_json: options.Json = False,
 ) -> int:
     """Find out what a record's model lacks, add it, and report the error before and after.
@@ -86,6 +91,8 @@ def explain(
     Effects are confirmed on blocks of the record that take no part in any fit. Ctrl-C ends the search and
     keeps what was found. Writes model.json, explanation.json and pictures to DIR.
     """
+    if report and out is None:
+        raise ParameterError("`report`: name the folder that it goes to (-o DIR), or use gpi report")
     read: dict[str, Any] = {
         "input": input,
         "output": output,
@@ -95,38 +102,51 @@ def explain(
         "resample": resample,
         "warmup": warmup,
     }
+    recording, found, where = explained(
+        records,
+        read,
+        experiments,
+        holdout_record,
+        effects=split_effects(effects),
+        require=split_effects(require),
+        order=order,
+        half_widths=options.parse_numbers("half_widths", half_widths),
+        thresholds=options.parse_numbers("thresholds", thresholds),
+        delay=delay,
+        reading=reading,
+    )
+    result = to_dict(found)
+    result["record"] = describe_record(recording, records)
+    result |= {"holdout": where, "files": []}
+    if out is not None:
+        name_pictures(result["residual"]["tests"], found.record.output_names)
+        page = page_of(found, context.obj, recording.notes) if report else None
+        write_results(out, found, result, "explanation.json", page)
+    if as_json:
+        print_json(result)
+    else:
+        summarise(console(), result, common_unit(found.record), out)
+    return 130 if found.interrupted else 0
+
+
+def explained(
+    records: list[Path],
+    read: dict[str, Any],
+    experiments: str | None,
+    holdout_record: Path | None,
+    **choices: Any,
+) -> tuple[Recording, Explanation, str]:
+    """Read records and explain them; says where the result is tested."""
     recording = options.read(records, **read, experiments=experiments)
     if holdout_record is not None and holdout_record.suffix == ".npy":
         raise ParameterError(
             f"`holdout-record` = {holdout_record}: a .npy file has no output of its own; use .npz"
         )
     other = None if holdout_record is None else options.read([holdout_record], **read).record()
-    record = recording.record()
     with progress_bar() as progress:
-        found = native.explain(
-            record,
-            other,
-            effects=split_effects(effects),
-            require=split_effects(require),
-            order=order,
-            half_widths=options.parse_numbers("half_widths", half_widths),
-            thresholds=options.parse_numbers("thresholds", thresholds),
-            delay=delay,
-            reading=reading,
-            progress=progress,
-        )
-    result = to_dict(found)
-    result["record"] = describe_record(recording, records)
+        found = native.explain(recording.record(), other, progress=progress, **choices)
     where = "blocks of time spread over the record" if other is None else f"another record: {holdout_record}"
-    result |= {"holdout": where, "files": []}
-    if out is not None:
-        name_pictures(result["residual"]["tests"], record.output_names)
-        write_results(out, found, result, "explanation.json")
-    if as_json:
-        print_json(result)
-    else:
-        summarise(console(), result, common_unit(record), out)
-    return 130 if found.interrupted else 0
+    return recording, found, where
 
 
 def split_effects(text: str | None) -> list[str] | None:
@@ -167,10 +187,22 @@ def before_and_after(result: Mapping[str, Any], unit: str) -> Table:
     return error_table(rows, unit)
 
 
-def write_results(out: Path, found: Explanation, result: dict[str, Any], name: str) -> None:
+def page_of(found: Explanation, command: str, notes: list[str]) -> str:
+    """Return the report."""
+    from gpi_hammerstein.report import report_html
+
+    with working("drawing"):
+        return report_html(found, command=command, notes=notes)
+
+
+def write_results(
+    out: Path, found: Explanation, result: dict[str, Any], name: str, page: str | None = None
+) -> None:
     """Write model.json, pictures and `result` as the file `name` to a folder; note the files in `result`."""
     with files.staged(out) as folder, working("drawing"):
         write_pictures(folder, found)
+        if page is not None:
+            (folder / "report.html").write_text(page, encoding="utf-8")
         files.save_model(found.model, folder / "model.json")
         result["files"] = sorted([*(file.name for file in folder.iterdir()), name])
         write_json(result, folder / name)

@@ -4,13 +4,12 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from gpi_hammerstein import plot
 from gpi_hammerstein._native import GpiError, Model, Record
 from gpi_hammerstein.cli.output import picture
-from gpi_hammerstein.plot.style import BLUE, label, shade_path
+from gpi_hammerstein.plot.signals import draw_loop
 
 # v-hat is worth a look while the noise that the inverse of G makes of the residual stays below this
 # fraction of the span of v.
@@ -41,20 +40,6 @@ def write_pictures(
     if len(found.singular_values):
         values = found.singular_values
         picture(folder / "singular_values.png", partial(plot.singular_values, model.linear, values=values))
-
-
-def draw_loop(ax: Axes, model: Model, u: NDArray[np.float64], v_hat: NDArray[np.float64] | None) -> None:
-    """Draw the loop of the first input: the model's, and v-hat where it can be seen."""
-    if v_hat is not None:
-        plot.loop(u[:, 0], v_hat, model, ax)
-    else:
-        v = model.intermediate(u)[:, 0]
-        plot.loop(u[:, 0], v, ax=ax)
-        if model.refinement is not None:
-            shade_path(ax, u[:, 0], v, model.refinement.loop_std(u)[:, 0], BLUE, model.output_units[0])
-            ax.legend(loc="upper left")
-    ax.set_xlabel(label(model.input_names[0], model.input_units[0]))
-    ax.set_ylabel(label("intermediate signal v", model.output_units[0]))
 
 
 def intermediate_seen(model: Model, record: Record) -> NDArray[np.float64] | None:

@@ -20,7 +20,7 @@ PICTURES = {
     "past-input": "residual_spectrum",
     "past-intermediate": "residual_spectrum",
     "level": "residual_over_input",
-    "speed": "residual_over_input",
+    "speed": "residual_over_speed",
     "direction": "residual_over_input",
     "amplitude": "residual_time",
     "level-to-level": "residual_time",
@@ -44,7 +44,7 @@ def name_pictures(tests: list[dict[str, Any]], outputs: Sequence[str], *, drawn:
 
 
 def write_residual_pictures(folder: Path, left: "Residuals") -> None:
-    """Draw every output's residual in time, over frequency, over the input and over the lag."""
+    """Draw every output's residual in time, over frequency, input, speed and lag."""
     from gpi_hammerstein import plot
 
     outputs = len(left.record.output_names)
@@ -53,6 +53,7 @@ def write_residual_pictures(folder: Path, left: "Residuals") -> None:
             "residual_time": plot.residual_in_time,
             "residual_spectrum": plot.residual_spectrum,
             "residual_over_input": plot.residual_over_input,
+            "residual_over_speed": plot.residual_over_speed,
             "residual_autocorrelation": plot.residual_autocorrelation,
         }
         for kind, draw in draws.items():

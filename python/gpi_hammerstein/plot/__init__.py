@@ -7,14 +7,15 @@ to each side, 95 % where the errors are normal.
 
 from gpi_hammerstein.plot.compensation import compensation
 from gpi_hammerstein.plot.explanation import loops
-from gpi_hammerstein.plot.linear import bode, markov, singular_values
+from gpi_hammerstein.plot.linear import bode, markov, response, singular_values
+from gpi_hammerstein.plot.recorded import record
 from gpi_hammerstein.plot.residuals import (
     Residuals,
     residual_autocorrelation,
     residual_in_time,
-    residual_over_input,
     residual_spectrum,
 )
+from gpi_hammerstein.plot.residuals_over_input import residual_over_input, residual_over_speed
 from gpi_hammerstein.plot.search import candidates, history
 from gpi_hammerstein.plot.signals import fit, loop, residual
 
@@ -28,10 +29,13 @@ __all__ = [
     "loop",
     "loops",
     "markov",
+    "record",
     "residual",
     "residual_autocorrelation",
     "residual_in_time",
     "residual_over_input",
+    "residual_over_speed",
     "residual_spectrum",
+    "response",
     "singular_values",
 ]

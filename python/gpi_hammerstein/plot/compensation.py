@@ -3,19 +3,17 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from gpi_hammerstein._native import Compensation, Model
+from gpi_hammerstein._native import Compensation
 from gpi_hammerstein.plot.style import BLUE, VERMILION, axes, label
 
 
-def compensation(model: Model, found: Compensation, ax: Axes | None = None) -> Axes:
+def compensation(found: Compensation, ax: Axes | None = None) -> Axes:
     """Draw the output over the reference: a loop for a drive in proportion, a line for the one found.
 
     Parameters
     ----------
-    model
-        The model that was compensated; its first output is drawn, in its unit.
     found
-        What ``model.compensate`` returned.
+        What ``model.compensate`` returned; the first output is drawn.
     ax
         Axes to draw on.
 
@@ -26,7 +24,7 @@ def compensation(model: Model, found: Compensation, ax: Axes | None = None) -> A
 
     Examples
     --------
-    >>> ax = gpi.plot.compensation(model, model.compensate(reference))  # doctest: +SKIP
+    >>> ax = gpi.plot.compensation(model.compensate(reference))  # doctest: +SKIP
     """
     ax = axes(ax, 5.0, 5.0)
 
@@ -40,8 +38,8 @@ def compensation(model: Model, found: Compensation, ax: Axes | None = None) -> A
     ):
         fit = f"{what}, {100 * error['nrmse']:.2g} % rms"
         ax.plot(reference, first(signal), color=color, lw=0.9, label=fit)
-    ax.set_xlabel(label(f"reference for {model.output_names[0]}", model.output_units[0]))
-    ax.set_ylabel(label(f"predicted {model.output_names[0]}", model.output_units[0]))
+    ax.set_xlabel(label(f"reference for {found.output_names[0]}", found.output_units[0]))
+    ax.set_ylabel(label(f"predicted {found.output_names[0]}", found.output_units[0]))
     ax.set_title("What the drive makes of the reference")
     ax.legend(loc="upper left")
     return ax

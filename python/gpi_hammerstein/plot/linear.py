@@ -182,3 +182,25 @@ def singular_values(sys: StateSpace, ax: Axes | None = None, *, values: ArrayLik
         ax.legend()
     ax.set(xlabel="number [-]", ylabel="singular value over the largest [-]", title="Block Hankel matrix")
     return ax
+
+
+def response(model: Model, ax: Axes | None = None) -> Axes:
+    """Draw the frequency response of a model's linear part, with its bands where they are known.
+
+    Parameters
+    ----------
+    model
+        Any model.
+    ax
+        Axes for the magnitude; the phase gets an axis at the right.
+
+    Returns
+    -------
+    Axes
+        The magnitude's axes.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.response(model)  # doctest: +SKIP
+    """
+    return bode(model.linear, model.rate, ax, refinement=model.refinement)

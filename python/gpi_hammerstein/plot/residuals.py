@@ -1,4 +1,4 @@
-"""Residuals in time, over frequency, over the input and over the lag."""
+"""Residuals in time, over frequency and over the lag."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,13 +8,11 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from gpi_hammerstein._native import Explanation, Model, Record
+from gpi_hammerstein.io import raise_warmup
 from gpi_hammerstein.plot.explanation import title
 from gpi_hammerstein.plot.style import BAND, BLACK, BLUE, ORANGE, axes, label
 
 Array = NDArray[np.float64]
-
-# More points than a picture has pixels only make its file large.
-MOST_POINTS = 20_000
 
 # One residual is blue; where there are two, the second is.
 COLOURS = {1: (BLUE,), 2: (ORANGE, BLUE)}
@@ -84,7 +82,8 @@ class Residuals:
         """
         series = {"before": found.residuals_before, "after": found.residuals_after}
         noise = np.asarray(found.noise_floor["rms"], dtype=np.float64)
-        return cls(found.record, series, found.held_out, noise, title(found))
+        record = raise_warmup(found.record, found.warmups)
+        return cls(record, series, found.held_out, noise, title(found))
 
     def of(self, experiment: int, output: int) -> list[tuple[str, str, Array]]:
         """Return name, colour and values of every residual of one output.
@@ -109,7 +108,7 @@ class Residuals:
             Which one, counted from 0.
         """
         scored = self.of(experiment, output)[0][2][self.record.warmup[experiment] :]
-        return 1.5 * float(np.quantile(np.abs(scored), 0.999)) + 1e-300
+        return 2.5 * float(np.quantile(np.abs(scored), 0.98)) + 1e-300
 
     def label(self, output: int) -> str:
         """Return the label of a residual's axis.
@@ -217,52 +216,6 @@ def residual_spectrum(
     ax.set_title(found.title)
     ax.grid(True, which="both", lw=0.3)
     ax.legend(loc="lower left")
-    return ax
-
-
-def residual_over_input(
-    found: Explanation | Residuals,
-    ax: Axes | None = None,
-    *,
-    experiment: int = 0,
-    input: int = 0,
-    output: int = 0,
-) -> Axes:
-    """Draw the residual against the input.
-
-    Parameters
-    ----------
-    found
-        What `explain` returned, or residuals.
-    ax
-        Axes to draw on.
-    experiment, input, output
-        Which one to draw, counted from 0.
-
-    Returns
-    -------
-    Axes
-        The axes.
-
-    Examples
-    --------
-    >>> ax = gpi.plot.residual_over_input(found)  # doctest: +SKIP
-    """
-    ax = axes(ax)
-    found = taken(found)
-    record = found.record
-    scored = slice(record.warmup[experiment], None)
-    u = record.u[experiment][scored, input]
-    every = max(1, len(u) // MOST_POINTS)
-    for name, color, values in found.of(experiment, output):
-        shown = values[scored][::every]
-        ax.plot(u[::every], shown, ".", ms=1.5, color=color, label=name, rasterized=True)
-    limit = found.limit(experiment, output)
-    ax.set_ylim(-limit, limit)
-    ax.set_xlabel(label(record.input_names[input], record.input_units[input]))
-    ax.set_ylabel(found.label(output))
-    ax.set_title(found.title)
-    ax.legend(loc="upper right", markerscale=6)
     return ax
 
 

@@ -4,17 +4,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
 
-from gpi_hammerstein._native import Model
+from gpi_hammerstein._native import Identification, Model, Refinement
 from gpi_hammerstein.plot.style import BLUE, GREEN, VERMILION, axes, label, say_nothing_to_draw
 
 
-def candidates(model: Model, ax: Axes | None = None) -> Axes:
+def candidates(found: Model | Identification, ax: Axes | None = None) -> Axes:
     """Draw the information criterion and the rms of every structure that was compared.
 
     Parameters
     ----------
-    model
-        Result of :func:`gpi_hammerstein.identify`.
+    found
+        Result of :func:`gpi_hammerstein.identify`, or its `identification`.
     ax
         Axes for the criterion; the rms gets an axis at the right.
 
@@ -30,8 +30,8 @@ def candidates(model: Model, ax: Axes | None = None) -> Axes:
     ax = axes(ax, 8.0, 4.5)
     ax.set(xlabel="parameters used [-]", ylabel="criterion above the best [-]")
     ax.set_title("Structures compared", pad=26.0)
-    found = model.identification
-    rows = [] if found is None else found.candidates
+    known = found.identification if isinstance(found, Model) else found
+    rows = [] if known is None else known.candidates
     if not rows:
         say_nothing_to_draw(ax, "no structures: not from identify")
         return ax
@@ -48,7 +48,7 @@ def candidates(model: Model, ax: Axes | None = None) -> Axes:
     ax.set_xlim(0.8 * float(used.min()), 1.4 * float(used.max()))
     right = ax.twinx()
     [squares] = right.plot(used, [row["rms"] for row in rows], "s", ms=5, mfc="none", color=VERMILION)
-    right.set_ylabel(label("residual rms", model.output_units[0]))
+    right.set_ylabel(label("residual rms", found.output_units[0] if isinstance(found, Model) else ""))
     [points] = ax.plot(used, above, "o", ms=5, color=BLUE)
     chosen = next(place for place, row in enumerate(rows) if row["chosen"])
     [ring] = ax.plot(used[chosen], above[chosen], "o", ms=12, mfc="none", mec=GREEN, mew=2)
@@ -79,13 +79,13 @@ def candidates(model: Model, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def history(model: Model, ax: Axes | None = None) -> Axes:
+def history(found: Model | Refinement, ax: Axes | None = None) -> Axes:
     """Draw the rms residual over the steps of the joint refinement, and the noise floor.
 
     Parameters
     ----------
-    model
-        Result of :func:`gpi_hammerstein.identify` or :func:`gpi_hammerstein.refine`.
+    found
+        Result of :func:`gpi_hammerstein.identify` or :func:`gpi_hammerstein.refine`, or its `refinement`.
     ax
         Axes to draw on.
 
@@ -99,9 +99,9 @@ def history(model: Model, ax: Axes | None = None) -> Axes:
     >>> ax = gpi.plot.history(model)  # doctest: +SKIP
     """
     ax = axes(ax)
-    unit = model.output_units[0] if len(model.output_names) == 1 else ""
+    refinement = found.refinement if isinstance(found, Model) else found
+    unit = found.output_units[0] if isinstance(found, Model) and len(found.output_names) == 1 else ""
     ax.set(xlabel="accepted steps [-]", ylabel=label("residual rms", unit or "-"), title="Joint refinement")
-    refinement = model.refinement
     if refinement is None:
         say_nothing_to_draw(ax, "no steps: the model was not refined")
         return ax
@@ -110,7 +110,7 @@ def history(model: Model, ax: Axes | None = None) -> Axes:
     if steps.max() > 10 * steps.min():
         ax.set_yscale("log")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    if len(model.output_names) == 1:
+    if len(refinement.residual_rms) == 1:
         floor = refinement.noise_floor
         ax.axhline(floor["rms"][0], color=VERMILION, ls="--", lw=1.0, label=f"noise floor: {floor['how']}")
     ax.legend()

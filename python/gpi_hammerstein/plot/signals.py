@@ -2,10 +2,12 @@
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gpi_hammerstein._native import Model, Record
 from gpi_hammerstein.plot.style import BLACK, BLUE, VERMILION, axes, label, shade_path
+
+Array = NDArray[np.float64]
 
 
 def loop(u: ArrayLike, v: ArrayLike, model: Model | None = None, ax: Axes | None = None) -> Axes:
@@ -53,6 +55,20 @@ def loop(u: ArrayLike, v: ArrayLike, model: Model | None = None, ax: Axes | None
     ax.set_ylabel(label("intermediate signal v", unit_out))
     ax.set_title("Hysteresis loop")
     return ax
+
+
+def draw_loop(ax: Axes, model: Model, u: Array, v_hat: Array | None) -> None:
+    """Draw the loop of the first input: the model's, and v-hat where it can be seen."""
+    if v_hat is not None:
+        loop(u[:, 0], v_hat, model, ax)
+    else:
+        v = model.intermediate(u)[:, 0]
+        loop(u[:, 0], v, ax=ax)
+        if model.refinement is not None:
+            shade_path(ax, u[:, 0], v, model.refinement.loop_std(u)[:, 0], BLUE, model.output_units[0])
+            ax.legend(loc="upper left")
+    ax.set_xlabel(label(model.input_names[0], model.input_units[0]))
+    ax.set_ylabel(label("intermediate signal v", model.output_units[0]))
 
 
 def fit(

@@ -53,6 +53,12 @@ def shade(
         )
 
 
+def pale(color: str) -> str:
+    """Return what a colour looks like on white when it shades a band."""
+    shares = (1 - SHADE * (1 - int(color[place : place + 2], 16) / 255) for place in (1, 3, 5))
+    return "#" + "".join(f"{round(255 * share):02x}" for share in shares)
+
+
 def shade_path(
     ax: Axes,
     x: NDArray[np.float64],
@@ -71,7 +77,8 @@ def shade_path(
     both = known[:-1] & known[1:]
     text = f"{BAND_LABEL}, at most \u00b1{half[known].max():.2g} {unit}".rstrip()
     # One colour without transparency: branches that overlap must not look surer.
-    pale = tuple(1 - SHADE * (1 - int(color[place : place + 2], 16) / 255) for place in (1, 3, 5))
-    band = PolyCollection(list(corners[both]), facecolors=[pale], edgecolors="none", zorder=1, label=text)
+    band = PolyCollection(
+        list(corners[both]), facecolors=[pale(color)], edgecolors="none", zorder=1, label=text
+    )
     # Where the data leave the loop open, the band may leave the picture.
     ax.add_collection(band, autolim=False)

@@ -100,7 +100,8 @@ pub(crate) fn next_experiment(
     let triangle = format!(
         "gpi excite triangle --rate {rate} --duration {duration} --frequency {} --range {low} {high} \
          -o next.csv",
-        20.0 / duration
+        // a number that can be typed
+        (20e4 / duration).round() / 1e4
     );
     let confounded = rejected.iter().find(|one| !one.confounded_with.is_empty());
     if let Some(one) = confounded {

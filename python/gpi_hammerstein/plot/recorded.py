@@ -1,0 +1,52 @@
+"""What was measured."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from gpi_hammerstein._native import Record
+from gpi_hammerstein.plot.style import BLACK, axes, label, line_style
+
+
+def record(record: Record, ax: Axes | None = None, *, experiment: int = 0) -> Axes:
+    """Draw the inputs and the outputs of an experiment over time, what is not scored shaded.
+
+    Parameters
+    ----------
+    record
+        What was measured.
+    ax
+        Axes for the outputs; the inputs get an axis at the right.
+    experiment
+        Which one to draw, counted from 0.
+
+    Returns
+    -------
+    Axes
+        The outputs' axes.
+
+    Examples
+    --------
+    >>> ax = gpi.plot.record(record)  # doctest: +SKIP
+    """
+    ax = axes(ax, 9.0, 4.0)
+    u, y = record.u[experiment], record.y[experiment]
+    t = np.arange(len(y)) / record.rate
+    right = ax.twinx()
+    lines: list[Line2D] = []
+    sides = (
+        (ax, y, record.output_names, record.output_units),
+        (right, u, record.input_names, record.input_units),
+    )
+    for side, signals, names, units in sides:
+        for name, unit, signal in zip(names, units, signals.T, strict=True):
+            color, dashes = line_style(len(lines))
+            lines += side.plot(t, signal, color=color, ls=dashes, lw=0.8, label=label(name, unit))
+        side.set_ylabel(", ".join(label(name, unit) for name, unit in zip(names, units, strict=True)))
+    if warmup := record.warmup[experiment]:
+        ax.axvspan(0.0, (warmup - 1) / record.rate, color=BLACK, alpha=0.08, lw=0)
+    ax.set_xlabel("time [s]")
+    which = f", experiment {experiment}" if len(record.u) > 1 else ""
+    ax.set_title(f"Measured{which}")
+    ax.legend(lines, [str(line.get_label()) for line in lines], loc="upper right")
+    return ax

@@ -1,0 +1,137 @@
+"""Tables of a report as HTML."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from gpi_hammerstein._native import Explanation, Model, effect_names
+from gpi_hammerstein.plot.style import BAND
+
+Row = Sequence[str]
+
+
+def table(head: Row, rows: Iterable[Row], numbers: Sequence[int] = ()) -> str:
+    """Return a table; the columns `numbers` are set to the right."""
+
+    def cells(tag: str, row: Row) -> str:
+        kinds = [' class="number"' if place in numbers else "" for place in range(len(row))]
+        return "".join(f"<{tag}{kind}>{escape(cell)}</{tag}>" for kind, cell in zip(kinds, row, strict=True))
+
+    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
+    return f'<div class="scroll"><table><tr>{cells("th", head)}</tr>{body}</table></div>'
+
+
+def errors(found: Explanation, unit: str) -> str:
+    """Return the errors before and after, fitted and held out."""
+    label = f" [{unit}]" if unit else ""
+    head = ["", f"rms{label}", "rms / span", "fit", f"largest{label}", "rms / noise"]
+    noise = float(np.sqrt(np.mean(np.square(found.noise_floor["rms"]))))
+    rows = []
+    for when, figures in (("before", found.before), ("after", found.after)):
+        for part, name in (("train", "fitted"), ("holdout", "held out")):
+            own = figures[part]
+            over = f"{own['rms'] / noise:.3g}" if noise > 0 else "-"
+            rows.append(
+                [
+                    f"{when}, {name}",
+                    f"{own['rms']:.4g}",
+                    f"{100 * own['nrmse']:.3g} %",
+                    f"{own['fit_percent']:.2f} %",
+                    f"{own['max']:.4g}",
+                    over,
+                ]
+            )
+    return table(head, rows, range(1, 6))
+
+
+def effects(found: Explanation) -> str:
+    """Return the parameters of every effect with their uncertainty and unit."""
+    names, shown = effect_names(), set[str]()
+    rows = []
+    for step in found.steps:
+        if step["effect"] is None:
+            continue
+        name = step["effect"]
+        first = [name, "one more" if name in shown else names[name]]
+        shown.add(name)
+        for row in step["parameters"]:
+            spread = f"± {BAND * row['std']:.2g}" if row["std"] else ""
+            rows.append([*first, row["name"], f"{row['value']:.5g}", spread, row["unit"]])
+            first = ["", ""]
+    if not rows:
+        return "<p>None was added.</p>"
+    head = ["effect", "what it is", "parameter", "value", "95 %", "unit"]
+    return table(head, rows, (3, 4))
+
+
+def rejected(found: Explanation) -> str:
+    """Return what was tried and not taken."""
+    rows = [[other["effect"], other["why"]] for other in found.rejected]
+    return table(["effect", "why it was not taken"], rows) if rows else ""
+
+
+def tests(found: Explanation) -> str:
+    """Return the tests of what is left."""
+    rows = [
+        [
+            test["output"],
+            test["name"],
+            f"{test['statistic']:.3g}",
+            f"{test['threshold']:.3g}",
+            f"{test['p_value']:.2g}",
+            "yes" if test["passed"] else "no",
+            "" if test["passed"] else test["points_to"],
+        ]
+        for test in found.tests
+    ]
+    head = ["output", "test", "statistic", "threshold", "p-value", "passed", "points to"]
+    return table(head, rows, (2, 3, 4))
+
+
+def poles(model: Model) -> str:
+    """Return the poles as frequencies with damping, or as time constants."""
+    rows = list(pole_rows(model))
+    if not rows:
+        return "<p>None but those of a dead time.</p>"
+    return table(["pole", "frequency [Hz]", "damping", "time constant [s]"], rows, (1, 2, 3))
+
+
+def pole_rows(model: Model) -> Iterator[list[str]]:
+    """Yield a row for each pole that is no delay, one for each pair."""
+    for pole in model.linear.poles:
+        if is_late(pole) or pole.imag < 0:
+            continue
+        continuous = np.log(complex(pole)) * model.rate
+        time = f"{-1 / continuous.real:.4g}" if continuous.real < 0 else "-"
+        text = f"{pole.real:.6f}" + (f" ± {pole.imag:.6f} i" if pole.imag else "")
+        if pole.imag or pole.real < 0:
+            frequency = abs(continuous) / (2 * np.pi)
+            yield [text, f"{frequency:.5g}", f"{-continuous.real / abs(continuous):.3g}", time]
+        else:
+            yield [text, "-", "-", time]
+
+
+def pairs(rows: Iterable[tuple[str, str]]) -> str:
+    """Return names and what belongs to them."""
+    return table(["", ""], rows).replace("<tr><th></th><th></th></tr>", "")
+
+
+def structure(model: Model) -> Mapping[str, Any]:
+    """Return what the model is made of, in words."""
+    words = {}
+    for name, gpi in zip(model.input_names, model.hysteresis, strict=True):
+        plays, zones = len(gpi.plays.weights), len(gpi.envelope.weights)
+        words[f"hysteresis of {name}"] = f"{plays} plays, {zones} deadzones"
+    late = sum(is_late(pole) for pole in model.linear.poles)
+    parts = [f"order {model.linear.order - late}"] if model.linear.order > late else ["a gain"]
+    if late:
+        parts.append(f"dead time {late} samples")
+    words["linear part"] = ", ".join(parts)
+    return words
+
+
+def is_late(pole: complex) -> bool:
+    """Whether a pole is one of a dead time."""
+    return abs(pole) < 1e-9
