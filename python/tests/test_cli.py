@@ -1,6 +1,7 @@
 """The command line's contract: exit codes, messages, one JSON object, nothing half written."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ import polars as pl
 import pytest
 
 import gpi_hammerstein as gpi
-from gpi_hammerstein.cli import run
+from gpi_hammerstein.cli import EXAMPLES, run
 from records import RATE, good_columns, write_csv
 
 FIGURES = {"rms", "nrmse", "fit_percent", "max"}
@@ -369,3 +370,17 @@ def test_the_process_leaves_with_the_code() -> None:
         assert name in help_.stdout
     missing = subprocess.run([*command, "identify", "none.csv"], capture_output=True, text=True)
     assert missing.returncode == 3 and missing.stdout == ""
+
+
+@pytest.mark.parametrize(("command", "example"), [(c.__name__, e) for c, e in EXAMPLES.items()])
+def test_help_ends_with_an_example_of_options_that_there_are(command, example, capsys):
+    assert run([command, "--help"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"Example: {example}" in said
+    options = [word.split("=")[0] for word in example.split() if word.startswith("-")]
+    assert all(re.search(rf"\s{option}\b", said) for option in options)
+
+
+def test_without_words_it_says_how_to_begin(capsys):
+    run([])
+    assert "To begin: `gpi demo`" in capsys.readouterr().out

@@ -3,8 +3,8 @@
 import os
 import shlex
 import sys
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
 
 import typer
 
@@ -26,10 +26,10 @@ DONE, FAILED, WRONG_CALL, UNUSABLE_DATA, INTERRUPTED = 0, 1, 2, 3, 130
 app = typer.Typer(
     name="gpi",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
-    help="Identify piezo and other smart-material actuators from measured data.",
+    help="Identify piezo and other smart-material actuators from measured data.\n\n"
+    "To begin: `gpi demo`, then `gpi report` with a record of your own.",
     epilog="Exit codes: 0 done, 2 the call is wrong, 3 the data are unusable, 1 anything else.",
 )
 
@@ -49,8 +49,18 @@ def _options(
     pass
 
 
-for command in (demo, identify, explain, report, simulate, validate, compensate, export):
-    app.command()(command)
+EXAMPLES: dict[Callable[..., Any], str] = {
+    demo: "gpi demo -o out/demo",
+    identify: "gpi identify run.csv --input u_V --output y_um -o model",
+    explain: "gpi explain run.csv --holdout-record other.csv -o explained --report",
+    report: "gpi report run.csv",
+    simulate: "gpi simulate model/model.json drive.csv -o prediction",
+    validate: "gpi validate model/model.json other.csv -o check",
+    compensate: "gpi compensate model/model.json path.csv --limits=-10,150 -o drive",
+    export: "gpi export model/model.json --limits=-10,150 --c compensator",
+}
+for command, example in EXAMPLES.items():
+    app.command(epilog=f"Example: {example}")(command)
 app.add_typer(excite, name="excite")
 app.add_typer(reproduce, name="reproduce")
 
