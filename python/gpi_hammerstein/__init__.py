@@ -60,7 +60,7 @@ from gpi_hammerstein.io import read_record
 from gpi_hammerstein.pickling import register
 
 if TYPE_CHECKING:
-    from gpi_hammerstein import interop, plot
+    from gpi_hammerstein import datasets, interop, plot
 
 __all__ = [
     "Compensation",
@@ -85,6 +85,7 @@ __all__ = [
     "Refinement",
     "StateSpace",
     "__version__",
+    "datasets",
     "decaying_triangle",
     "effect_names",
     "era",
@@ -110,8 +111,8 @@ register()
 
 
 def __getattr__(name: str) -> Any:
-    """Load `plot`, and with it Matplotlib, and `interop` when they are first used."""
-    if name in ("plot", "interop"):
+    """Load `plot`, and with it Matplotlib, `interop` and `datasets` when they are first used."""
+    if name in ("plot", "interop", "datasets"):
         import importlib
 
         return importlib.import_module(f"gpi_hammerstein.{name}")

@@ -10,6 +10,7 @@ import typer
 
 from gpi_hammerstein._native import DataError, ParameterError, __version__
 from gpi_hammerstein.cli.compensate import compensate
+from gpi_hammerstein.cli.datasets import datasets
 from gpi_hammerstein.cli.demo import demo
 from gpi_hammerstein.cli.excite import excite
 from gpi_hammerstein.cli.explain import explain
@@ -62,6 +63,7 @@ EXAMPLES: dict[Callable[..., Any], str] = {
 for command, example in EXAMPLES.items():
     app.command(epilog=f"Example: {example}")(command)
 app.add_typer(excite, name="excite")
+app.add_typer(datasets, name="datasets")
 app.add_typer(reproduce, name="reproduce")
 
 
