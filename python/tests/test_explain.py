@@ -79,6 +79,13 @@ def test_a_hum_is_no_mode_that_rings_on(frequency, amplitude):
     assert values["amplitude"] == pytest.approx(amplitude, rel=0.05)
 
 
+def test_a_column_that_repeats_the_input_is_no_effect():
+    run = plants.draw(2, ("creep",), 15.0, SECONDS, RATE).record(0)
+    reference = 3.0 * run.u + 1.0 + 1e-3 * np.sin(np.arange(len(run.u)))
+    found = gpi.explain(gpi.Record(run.u, run.y, RATE, covariates=reference))
+    assert found.effects == ["creep"]
+
+
 def test_loops_that_open_with_speed_are_fitted_on_grids_that_move():
     # without it, what the grid has bent to is taken for a shape of the loops
     plant, found = explained(8024, ("rate-dependence",), 20.0)

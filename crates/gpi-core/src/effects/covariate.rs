@@ -1,9 +1,10 @@
 //! Another measured column that leaks in.
 
 use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
+use crate::Record;
 
 /// `y += g L x`: a measured column x (a temperature, a neighbouring axis) leaks in, at once or through a
-/// first-order lag L of unit gain and time constant T.
+/// first-order lag L of unit gain and time constant T. A column that only repeats an input is none.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Covariate {
     /// The output that it adds to.
@@ -48,7 +49,7 @@ impl Covariate {
             });
             let (low, high) = ranges
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-            if high <= low {
+            if high <= low || follows_an_input(situation.record, column) {
                 continue;
             }
             for output in situation.outputs() {
@@ -70,6 +71,24 @@ impl Covariate {
         }
         found
     }
+}
+
+/// Whether a column says no more than an input does: a reference that the input was made from, a monitor of it.
+fn follows_an_input(record: &Record, column: usize) -> bool {
+    /// Of the column's squares about its mean, what no multiple of the input explains.
+    const LEFT: f64 = 1e-3;
+    (0..record.inputs().len()).any(|input| {
+        let (mut samples, mut sums) = (0.0, [0.0; 5]);
+        for experiment in record.experiments() {
+            let (u, x) = (experiment.input.column(input), experiment.covariates.column(column));
+            samples += u.len() as f64;
+            let own = [u.sum(), x.sum(), u.norm_squared(), x.norm_squared(), u.dot(&x)];
+            sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+        }
+        let [u, x, uu, xx, ux] = sums;
+        let (uu, xx, ux) = (uu - u * u / samples, xx - x * x / samples, ux - u * x / samples);
+        uu * xx - ux * ux < LEFT * uu * xx
+    })
 }
 
 impl Block for Covariate {
