@@ -160,14 +160,27 @@ fn as_measured(prepared: &Record, given: &Record, means: &[f64]) -> Result<Recor
 /// Refines everything once more, grids that were not given included, and works out how sure it is.
 fn finish(search: &mut Search, interrupted: bool, progress: Progress) -> Result<Refinement, Error> {
     const STEPS: usize = 15;
+    /// With the grids held.
+    const STILL: usize = 30;
     /// Times the gain at which a refinement by itself would end: as much as chance gives one parameter.
     const COARSER: f64 = 10.0;
-    let mut options =
-        settings(&search.prepared, &search.moving, if interrupted { 1 } else { STEPS });
+    let stage = |options: &RefineOptions, steps: usize| {
+        let mut own = settings(&search.prepared, options, steps);
+        own.weighting.outputs.clone_from(&search.options.weighting.outputs);
+        own
+    };
+    let mut options = stage(&search.moving, if interrupted { 1 } else { STEPS });
     options.gain *= COARSER;
-    options.weighting.outputs.clone_from(&search.options.weighting.outputs);
-    let fitted =
-        fit(search.point.clone(), &search.prepared.record, &options, "refinement", progress)?;
+    let record = &search.prepared.record;
+    let mut fitted = fit(search.point.clone(), record, &options, "refinement", progress)?;
+    if !interrupted && (search.moving.thresholds || search.moving.half_widths) {
+        // with all that moves at once, the kinks at which plays turn end the fit before the rest has settled
+        let still = stage(&RefineOptions::default(), STILL);
+        let before = fitted.history;
+        let settled = fit(fitted.point, record, &still, "refinement", progress)?.after(&before);
+        fitted =
+            fit(settled.point, record, &options, "refinement", progress)?.after(&settled.history);
+    }
     search.point = fitted.point.clone();
     search.repair()?;
     let refined = Refined { fitted, options, outliers: 0, robust: false };
