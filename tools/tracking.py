@@ -39,8 +39,8 @@ cent of the reference's span, without the sensor's noise:
 
 {table}
 
-`in proportion`: a drive in proportion to the reference, between the extremes of the compensated
-one. `as it was`: `model.compensate` with the model of the stage before the change. `identified
+`in proportion`: a drive in proportion to the reference, the straight line through the drive of the next
+column. `as it was`: `model.compensate` with the model of the stage before the change. `identified
 anew` and `after explain`: with models from one record of the changed stage, of `identify` and of
 `explain`. `gain`: the first over the last. `explained by the change`: how much of what the drive of
 the stage as it was misses is the difference between the two stages under that drive. `noise`: the
@@ -119,8 +119,7 @@ def track(seed: int) -> list[float]:
         return float(100 * np.sqrt(np.mean(error**2)) / span)
 
     old = gpi.identify(record).compensate(wanted, limits=limits)
-    low, high = old.drive.min(), old.drive.max()
-    line = low + (high - low) * (wanted - wanted.min()) / span
+    line = np.polyval(np.polyfit(wanted, old.drive[old.lead :], 1), wanted)
     errors = [rms(missed(after, line, 0)), rms(missed(after, old.drive, old.lead))]
     for model in (gpi.identify(anew), gpi.explain(anew).model):
         found = model.compensate(wanted, limits=limits)

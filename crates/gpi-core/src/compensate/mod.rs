@@ -43,7 +43,7 @@ pub struct Compensation {
     pub reference: Matrix,
     /// The outputs of the model for `drive`, without the effects that no input drives.
     pub predicted: Matrix,
-    /// The same for a drive in proportion to the reference, between the same extremes.
+    /// The same for a drive in proportion to the reference: the straight line through `drive`.
     pub in_proportion: Matrix,
     /// Samples by which the drive begins before the reference.
     pub lead: usize,
@@ -268,7 +268,7 @@ struct Found {
     too_fast: usize,
 }
 
-/// A drive in proportion to what G at rest asks for, between the extremes of another drive.
+/// A drive in proportion to what G at rest asks for: the straight line through another drive, by least squares.
 fn proportional(model: &Model, reference: &Matrix, drive: &Matrix) -> Result<Matrix, Error> {
     let still = Matrix::from_fn(reference.nrows(), reference.ncols(), |k, o| {
         reference[(k, o)] - model.offsets()[o]
@@ -276,10 +276,14 @@ fn proportional(model: &Model, reference: &Matrix, drive: &Matrix) -> Result<Mat
     let v = still * dynamics::inverse_gain(model.linear())?.transpose();
     let mut line = v.clone();
     for ((mut line, v), u) in line.column_iter_mut().zip(v.column_iter()).zip(drive.column_iter()) {
-        let (low, high) = (v.imin(), v.imax());
-        let span = v[high] - v[low];
-        let slope = if span > 0.0 { (u.max() - u.min()) / span } else { 0.0 };
-        line.iter_mut().for_each(|value| *value = u.min() + slope * (*value - v[low]));
+        let (v_mean, u_mean) = (v.mean(), u.mean());
+        let (mut squares, mut products) = (0.0, 0.0);
+        for (v, u) in v.iter().zip(u.iter()) {
+            squares += (v - v_mean) * (v - v_mean);
+            products += (v - v_mean) * (u - u_mean);
+        }
+        let slope = if squares > 0.0 { products / squares } else { 0.0 };
+        line.iter_mut().for_each(|value| *value = u_mean + slope * (*value - v_mean));
     }
     Ok(line)
 }
