@@ -205,6 +205,30 @@ def test_mismatched_lengths_are_refused(tmp_path: Path) -> None:
     refuse(tmp_path / "turned.npz", "2 samples of 9 channels", "transpose")
 
 
+def test_a_recorder_of_western_europe_is_read(tmp_path: Path) -> None:
+    """Latin-1, semicolons, decimal commas, and words for what is measured."""
+    lines = ["# Messung 23 \u00b0C", "time_ms;voltage_V;position_um"]
+    lines += [f"{1e3 * t:g};{u:g};{y:.3e}".replace(".", ",") for t, u, y in zip(T, U, Y, strict=True)]
+    path = tmp_path / "messung.csv"
+    path.write_bytes("\n".join(lines).encode("latin-1"))
+    record = gpi.read_record(path)
+    assert (record.input_names, record.output_names, record.output_units) == (
+        ["voltage"],
+        ["position"],
+        ["um"],
+    )
+    np.testing.assert_allclose(record.u[0][:, 0], U, rtol=1e-5)
+    np.testing.assert_allclose(record.y[0][:, 0], Y, rtol=1e-3)
+    # where there is a `u`, a voltage is only another column
+    beside = write_csv(tmp_path / "beside.csv", {"t": T, "u": U, "voltage": Y, "y": Y})
+    assert gpi.read_record(beside).covariate_names == ["voltage"]
+
+
+def test_all_that_is_missing_is_said_at_once(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "r.csv", {"Zeit": T, "Spannung": U, "Weg": Y})
+    refuse(path, "--input", "--output", "--time", "Zeit, Spannung, Weg")
+
+
 def test_names_that_are_not_there_are_refused(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "r.csv", {"a": T, "b": U, "c": Y})
     refuse(path, "no input column", "a, b, c")

@@ -18,6 +18,9 @@ UNITS = frozenset(
 TIME = re.compile(r"t|time|timestamp", re.IGNORECASE)
 INPUT = re.compile(r"(u|in|input)_?\d*", re.IGNORECASE)
 OUTPUT = re.compile(r"(y|out|output)_?\d*", re.IGNORECASE)
+# What actuators are driven by and what they do, where no column has one of the names above.
+DRIVE = re.compile(r"(voltage|drive|command)_?\d*", re.IGNORECASE)
+MOTION = re.compile(r"(position|displacement)_?\d*", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -105,8 +108,8 @@ def assign_roles(
         The file, for messages.
     time, inputs, outputs, covariates
         Names given by the user, with or without unit. What is None is found by its usual name:
-        ``t`` or ``time``; ``u``, ``u1``, ``input``; ``y``, ``y1``, ``output``; every other column is
-        a covariate.
+        ``t`` or ``time``; ``u``, ``u1``, ``input``, else ``voltage``, ``drive``, ``command``; ``y``,
+        ``y1``, ``output``, else ``position``, ``displacement``; every other column is a covariate.
     need_time
         False when the rate is known: a time column is then found but not needed.
 
@@ -153,12 +156,23 @@ def assign_roles(
 
     times = time_given or usual(TIME, given)[:1]
     if chosen_inputs is None:
-        chosen_inputs = usual(INPUT, [*given, *times])
+        chosen_inputs = usual(INPUT, [*given, *times]) or usual(DRIVE, [*given, *times])
     if chosen_outputs is None:
-        chosen_outputs = usual(OUTPUT, [*given, *times])
+        chosen_outputs = usual(OUTPUT, [*given, *times]) or usual(MOTION, [*given, *times])
     if not chosen_inputs:
         there = ", ".join(column.header for column in columns)
-        raise DataError(f"{source}: no input column; name one with input= (--input). There are: {there}")
+        others = [
+            what
+            for what, missing in (
+                ("the output with output= (--output)", not chosen_outputs),
+                ("the time with time= (--time), or give the rate in Hz with rate= (--rate)", not times),
+            )
+            if missing
+        ]
+        more = "".join(f", {what}" for what in others)
+        raise DataError(
+            f"{source}: no input column; name one with input= (--input){more}. There are: {there}"
+        )
     if not times and need_time:
         raise DataError(
             f"{source}: no time column; name one with time= (--time) or give the sampling rate in Hz "

@@ -28,7 +28,7 @@ def read_record(
     rate: float | None = None,
     covariate: Names | None = None,
     warmup: int | None = None,
-    resample: bool | float | None = None,
+    resample: bool | float | str | None = None,
     experiment: str | int | Sequence[int] | None = None,
 ) -> Record:
     """Read a record of one or several experiments.
@@ -44,9 +44,10 @@ def read_record(
         frame of Polars or pandas, or an xarray dataset, with columns named as in a CSV file.
     input, output, covariate
         Names of the columns with or without their unit: ``"u_V"`` or ``"u"``. What is not given is
-        found: inputs ``u``, ``u1``, ``input``; outputs ``y``, ``y1``, ``output``; every other column is a
-        covariate (``covariate=[]`` leaves them out). For ``.npy`` files, which hold the input alone,
-        `output` is the path of the file that holds the output, one for each of them.
+        found: inputs ``u``, ``u1``, ``input``, else ``voltage``, ``drive``, ``command``; outputs ``y``,
+        ``y1``, ``output``, else ``position``, ``displacement``; every other column is a covariate
+        (``covariate=[]`` leaves them out). For ``.npy`` files, which hold the input alone, `output` is
+        the path of the file that holds the output, one for each of them.
     time
         Name of the time column; ``t`` and ``time`` are found. The unit after its last underscore is
         heeded (``t_ms``), s when there is none.
@@ -56,8 +57,9 @@ def read_record(
         Samples at the start of every experiment that drive the model but are not scored; None is 0, or
         what the periods of an array say.
     resample
-        True, or a rate in Hz: makes non-uniform sampling uniform by linear interpolation, and cuts the
-        record into several experiments at gaps and where the clock jumps back.
+        A rate in Hz, or True (or ``"auto"``) for that of the usual step: makes non-uniform sampling
+        uniform by linear interpolation, and cuts the record into several experiments at gaps and where
+        the clock jumps back.
     experiment
         Experiments to keep, counted from 0: ``3``, ``[0, 2]``, ``"0-4,7"``.
 
@@ -104,7 +106,7 @@ def read_recording(
     rate: float | None = None,
     covariate: Names | None = None,
     warmup: int | None = None,
-    resample: bool | float | None = None,
+    resample: bool | float | str | None = None,
     experiment: str | int | Sequence[int] | None = None,
 ) -> Recording:
     """Read like :func:`read_record`, but without asking for an output column.
@@ -219,7 +221,7 @@ def _output_files(paths: Sequence[Path], outputs: list[str] | None) -> dict[Path
 
 
 def _read_part(
-    table: Table, roles: Roles, rate: float | None, resample: bool | float | None, warmup: int | None
+    table: Table, roles: Roles, rate: float | None, resample: bool | float | str | None, warmup: int | None
 ) -> Recording:
     """Cut one table into experiments."""
     signals = [*roles.inputs, *roles.outputs, *roles.covariates]
@@ -231,7 +233,9 @@ def _read_part(
         table.require_numbers([roles.time])
         stamps = table.columns[roles.time] * TIME_UNITS.get(roles.time.unit, 1.0)
         if resample:
-            asked = None if resample is True else float(resample)
+            if isinstance(resample, str) and resample != "auto":
+                raise ParameterError(f"`resample` = {resample}: a rate in Hz, or `auto` for the usual step")
+            asked = None if isinstance(resample, bool | str) else float(resample)
             found = put_on_grid(stamps, samples, asked, table.source)
             pieces, given, notes = found.pieces, found.rate, [found.note]
             starts = [0.0] * len(pieces)

@@ -14,6 +14,9 @@ from gpi_hammerstein.io.columns import Column, parse_header
 
 Array = NDArray[np.float64]
 
+# A number as it is written where the comma is the decimal mark; whole numbers have none.
+DECIMAL_COMMA = r"(?i)^[+-]?(\d*(,\d*)?(e[+-]?\d+)?|nan|inf)$"
+
 
 @dataclass(frozen=True)
 class Table:
@@ -44,15 +47,17 @@ class Table:
             if column in self.text:
                 row, cell = self.text[column]
                 raise DataError(
-                    f"{self.source}: column `{column.header}` holds text, first `{cell}` in row {row}; "
-                    "repair it, or leave it out by naming the covariates (covariate=[], --covariate none)"
+                    f"{self.source}: column `{column.header}` holds text, first `{cell}` in row {row} "
+                    "(the rows below the names count from 0); repair or remove such rows, or leave the "
+                    "column out where it is no input, output or time (covariate=[], --covariate none)"
                 )
             rows = np.flatnonzero(~np.isfinite(self.columns[column]))
             if rows.size:
                 shown = ", ".join(map(str, rows[:5])) + (", .." if rows.size > 5 else "")
                 raise DataError(
                     f"{self.source}: column `{column.header}` has {rows.size} NaN, infinite or empty "
-                    f"samples, in rows {shown}; repair or cut out these rows"
+                    f"samples, in rows {shown} (counted from 0 below the names); repair these rows, or cut "
+                    "them out and read the rest with --resample auto (resample=True)"
                 )
 
     def stack(self, columns: Sequence[Column]) -> Array:
@@ -67,8 +72,8 @@ def read_csv(path: Path) -> Table:
     Parameters
     ----------
     path
-        Comma, semicolon or tab separated, with one header line; lines that start with ``#`` are
-        left out.
+        Comma, semicolon or tab separated, with one header line, in UTF-8 or Latin-1; lines that start
+        with ``#`` are left out. Where the separator is no comma, numbers may have a decimal comma.
 
     Returns
     -------
@@ -90,11 +95,11 @@ def read_csv(path: Path) -> Table:
             import gzip
 
             data = gzip.decompress(data)
-        text = data.decode("utf-8-sig")
+        text = decoded(data)
     except (OSError, EOFError) as error:
         raise DataError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path}: not a text file; a CSV record is UTF-8 text") from error
+    except UnicodeDecodeError:
+        raise DataError(f"{path}: not a text file; a CSV record is text, in UTF-8 or Latin-1") from None
     header = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     if not header:
         raise DataError(f"{path}: the file is empty; a record has a header line and one row a sample")
@@ -181,6 +186,9 @@ def from_frame(frame: pl.DataFrame, source: str) -> Table:
         if series.dtype == pl.String:
             cells = series.str.strip_chars()
             cells = cells.set(cells == "", None)
+            # commas within a cell are decimal ones: the other separators come with them
+            if cells.str.contains(DECIMAL_COMMA).fill_null(True).all():
+                cells = cells.str.replace(",", ".", literal=True)
             numbers = cells.cast(pl.Float64, strict=False)
             wrong = (numbers.is_null() & cells.is_not_null()).arg_true()
             if len(wrong):
@@ -193,6 +201,16 @@ def from_frame(frame: pl.DataFrame, source: str) -> Table:
             continue
         columns[column] = numbers.fill_null(float("nan")).to_numpy().astype(np.float64)
     return Table(source, columns, text)
+
+
+def decoded(data: bytes) -> str:
+    """Return the text of a file: UTF-8, else Latin-1, which recorders of Western Europe write."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        if b"\0" in data:
+            raise
+        return data.decode("latin-1")
 
 
 def _is_number(cell: str) -> bool:
