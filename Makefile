@@ -17,7 +17,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # The order of `make test` is part of what it promises, also under `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench bench-peers figures monte-carlo tracking firmware-cost scoreboard blind-exam clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench bench-peers docs figures monte-carlo tracking firmware-cost scoreboard blind-exam clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -49,18 +49,24 @@ test-rust: ## Firmware build, unit tests, documentation tests, benchmarks in tes
 	$(call heading,Rust: benchmarks in test mode)
 	cargo test --benches
 
-lint-python: $(NATIVE) ## ruff, mypy and stubtest
+lint-python: $(NATIVE) ## ruff, mypy, basedpyright and stubtest
 	$(call heading,Python: lint and format)
 	$(BIN)/python -m ruff check
 	$(BIN)/python -m ruff format --check
 	$(call heading,Python: types)
 	$(BIN)/python -m mypy --strict
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m basedpyright --verifytypes gpi_hammerstein --ignoreexternal
 	$(call heading,Python: stub of the compiled module)
 	$(BIN)/python -m mypy.stubtest gpi_hammerstein._native
 
 test-python: $(NATIVE) ## pytest
 	$(call heading,Python: tests)
 	$(BIN)/python -m pytest -n auto
+
+docs: $(NATIVE) ## Build the documentation into out/site; its tutorial fetches a record or takes it from GPI_DATA_DIR
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going docs out/site
+	cargo doc -p gpi-core --no-deps
+	rm -rf out/site/rust && cp -R target/doc out/site/rust
 
 bench: ## Run the benchmarks
 	cargo bench

@@ -5,15 +5,21 @@ import inspect
 from collections.abc import Iterator
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
 
+import api_walk
 import gpi_hammerstein as gpi
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt  # noqa: E402
 
 
 def public() -> Iterator[tuple[str, Any]]:
-    for name in sorted(set(gpi.__all__) - {"__version__"}):
-        thing = getattr(gpi, name)
+    own = [(name, getattr(gpi, name)) for name in sorted(set(gpi.__all__) - {"__version__"})]
+    for name, thing in own + [one for one in api_walk.public() if "." in one[0]]:
         yield name, thing
         if inspect.isclass(thing):
             for member in sorted(vars(thing)):
@@ -28,4 +34,5 @@ def test_public_names_are_documented_and_their_examples_run(name: str, thing: An
     test = doctest.DocTestParser().get_doctest(doc, {"gpi": gpi, "np": np}, name, None, None)
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE, verbose=False)
     runner.run(test)
+    plt.close("all")
     assert runner.failures == 0, f"{runner.failures} examples of {name} fail"
