@@ -37,7 +37,7 @@ class Dataset:
 
     Examples
     --------
-    >>> CATALOGUE["throttle-valve"].licence
+    >>> gpi.datasets.CATALOGUE["throttle-valve"].licence
     'BSD-3-Clause'
     """
 
@@ -153,7 +153,7 @@ def fetch(name: str, part: str | None = None) -> list[Path]:
 
     Examples
     --------
-    >>> fetch("throttle-valve", "3")  # doctest: +SKIP
+    >>> gpi.datasets.fetch("throttle-valve", "3")  # doctest: +SKIP
     """
     dataset, part = chosen(name, part)
     return [here(name, path) or fetched(dataset, path) for path in dataset.parts[part][0]]
@@ -181,7 +181,7 @@ def load(name: str, part: str | None = None) -> Record:
 
     Examples
     --------
-    >>> record = load("piezo-p885-dbo")  # doctest: +SKIP
+    >>> record = gpi.datasets.load("piezo-p885-dbo")  # doctest: +SKIP
     """
     dataset, own = chosen(name, part)
     return dataset.parts[own][1](*fetch(name, own))
@@ -223,4 +223,4 @@ def fetched(dataset: Dataset, path: str) -> Path:
         raise DataError(
             f"{address}: cannot be fetched ({type(error).__name__}: {error}); without a network put the file "
             "into a folder of the set's name and let GPI_DATA_DIR name the folder above"
-        ) from error
+        ) from None

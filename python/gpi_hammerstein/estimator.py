@@ -1,18 +1,40 @@
 """An estimator for scikit-learn, which is imported with this module and is no dependency."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from gpi_hammerstein._native import Record, identify
+from gpi_hammerstein._native import Model, Record, identify
+
+if TYPE_CHECKING:
+    # scikit-learn has no types of its own: what a user's type checker may know of its base classes.
+    class BaseEstimator:
+        """What every estimator has."""
+
+        def get_params(self, deep: bool = True) -> dict[str, Any]:
+            """Return the parameters by name."""
+
+        def set_params(self, **params: Any) -> Self:
+            """Set parameters by name."""
+
+        def __sklearn_tags__(self) -> Any:
+            """Return what scikit-learn should know of the estimator."""
+
+    class RegressorMixin:
+        """What every regressor has."""
+
+        def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
+            """Return the coefficient of determination."""
+
+else:
+    from sklearn.base import BaseEstimator, RegressorMixin
 
 __all__ = ["GpiRegressor"]
 
 
-class GpiRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+class GpiRegressor(RegressorMixin, BaseEstimator):
     """Hysteresis before linear dynamics as a regressor of scikit-learn.
 
     Rows are samples in the order of time at an even rate: what comes before a row matters, so that rows must
@@ -22,8 +44,11 @@ class GpiRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     ----------
     rate
         Sampling rate in Hz.
-    order, half_widths, thresholds, delay
+    order, delay
         As in :func:`gpi_hammerstein.identify`; chosen from the data when left out.
+    half_widths, thresholds
+        How many plays and deadzones, or their half-widths and thresholds, shape (n,), in the unit of u, as in
+        :func:`gpi_hammerstein.identify`; chosen from the data when left out.
 
     Attributes
     ----------
@@ -32,8 +57,15 @@ class GpiRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     Examples
     --------
-    >>> GpiRegressor(rate=1000.0).fit(u, y).predict(u)  # doctest: +SKIP
+    >>> from gpi_hammerstein.estimator import GpiRegressor
+    >>> X = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))[:, None]
+    >>> y = gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(X[:, 0])
+    >>> fitted = GpiRegressor(rate=1000.0, half_widths=[0.0, 2.0], thresholds=0, delay=0).fit(X, y)
+    >>> fitted.score(X, y) > 0.99
+    True
     """
+
+    model_: Model
 
     def __init__(
         self,
@@ -51,15 +83,15 @@ class GpiRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.thresholds = thresholds
         self.delay = delay
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "GpiRegressor":
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Identify a model.
 
         Parameters
         ----------
         X
-            Inputs, (samples, inputs).
+            Inputs, shape (samples, inputs), each in its own unit.
         y
-            Outputs, (samples,) or (samples, outputs).
+            Outputs, shape (samples,) or (samples, outputs), each in its own unit.
 
         Returns
         -------
@@ -88,12 +120,12 @@ class GpiRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Parameters
         ----------
         X
-            Inputs, (samples, inputs).
+            Inputs, shape (samples, inputs), each in its own unit.
 
         Returns
         -------
         ndarray
-            Outputs, (samples,) or (samples, outputs).
+            Outputs, shape (samples,) or (samples, outputs), in the units of y.
         """
         check_is_fitted(self)
         u = validate_data(self, X, reset=False, dtype=np.float64)

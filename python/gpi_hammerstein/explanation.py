@@ -80,7 +80,7 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
     unit
         The unit of the outputs.
     numbers
-        Whether a sentence names the parameters of each effect.
+        Whether sentences name the parameters of each effect and the figures of each test that fails.
 
     Yields
     ------
@@ -95,6 +95,8 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
     space = f" {unit}" if unit else ""
     before, after = (result["error"][when]["holdout"]["rms"] for when in ("before", "after"))
     names = effect_names()
+    if result["interrupted"]:
+        yield "Stopped before the search had finished: this is what was found so far."
     if not result["effects"]:
         if result["verdict"] == "explained":
             yield "The model lacks nothing: what is left is noise."
@@ -136,7 +138,12 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
     floor = result["noise_floor"]["rms"]
     left = result["error"]["after"]["train"]["rms"]
     yield f"What is left is {left:.4g}{space} rms; the noise floor is {floor:.4g}{space}."
-    yield from failed_in_words(result["residual"]["tests"])
+    tests = result["residual"]["tests"]
+    failed = list(dict.fromkeys(test["name"] for test in tests if not test["passed"]))
+    if numbers:
+        yield from failed_in_words(tests)
+    elif failed:
+        yield f"It fails the test{'s' if len(failed) > 1 else ''} {join(failed)}."
     yield {
         "explained": "Verdict: explained; the residual shows no more than noise.",
         "partly-explained": "Verdict: partly explained; structure is left in the residual.",

@@ -69,7 +69,7 @@ def save_model(model: Model, path: str | os.PathLike[str]) -> None:
 
     Examples
     --------
-    >>> save_model(model, "model.json")  # doctest: +SKIP
+    >>> gpi.save(model, "model.json")  # doctest: +SKIP
     """
     write_atomically(path, model.to_json())
 
@@ -94,7 +94,7 @@ def load_model(path: str | os.PathLike[str]) -> Model:
 
     Examples
     --------
-    >>> model = load_model("model.json")  # doctest: +SKIP
+    >>> model = gpi.load("model.json")  # doctest: +SKIP
     """
     try:
         text = Path(path).read_text(encoding="utf-8")

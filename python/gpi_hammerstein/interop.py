@@ -30,7 +30,8 @@ def to_control(system: StateSpace, rate: float) -> Any:
 
     Examples
     --------
-    >>> gpi.interop.to_control(model.linear, model.rate).damp()  # doctest: +SKIP
+    >>> gpi.interop.to_control(gpi.StateSpace([[0.5]], [[1.0]], [[0.5]], [[0.0]]), 1e3).dt
+    0.001
     """
     import control
 
@@ -57,7 +58,9 @@ def from_control(system: Any) -> StateSpace:
 
     Examples
     --------
-    >>> gpi.interop.from_control(control.sample_system(plant, 1e-3))  # doctest: +SKIP
+    >>> import control
+    >>> gpi.interop.from_control(control.tf([0.5], [1.0, -0.5], 1e-3)).dc_gain.round(9).item()
+    1.0
     """
     import control
 
@@ -185,7 +188,9 @@ def to_pandas(record: Record, experiment: int = 0) -> Any:
 
     Examples
     --------
-    >>> gpi.interop.to_pandas(record).plot(x="t [s]")  # doctest: +SKIP
+    >>> record = gpi.Record([0.0, 1.0], [0.0, 2.0], 10.0, input_units=["V"])
+    >>> gpi.interop.to_pandas(record)["u [V]"].tolist()
+    [0.0, 1.0]
     """
     import pandas as pd
 
@@ -209,7 +214,8 @@ def to_xarray(record: Record, experiment: int = 0) -> Any:
 
     Examples
     --------
-    >>> gpi.interop.to_xarray(record)["y"].attrs  # doctest: +SKIP
+    >>> record = gpi.Record([0.0, 1.0], [0.0, 2.0], 10.0, output_units=["um"])
+    >>> gpi.interop.to_xarray(record)["y"].attrs
     {'units': 'um'}
     """
     import xarray as xr

@@ -147,6 +147,7 @@ def test_the_search_can_be_stopped_and_keeps_what_it_found():
     found = gpi.explain(record_of(plant.record(0)), progress=stop, order=3)
     assert found.interrupted
     assert found.effects == ["periodic-disturbance"]
+    assert next(iter(in_words(found.to_dict()))).startswith("Stopped before the search had finished")
 
 
 def test_an_interrupt_before_anything_is_known_is_raised():

@@ -457,7 +457,7 @@ def test_two_inputs_and_two_outputs():
     outputs = [respond(u, system, [3.0, -1.0]) for u in runs]
     rng = np.random.default_rng(13)
     noisy = [y + NOISE * np.ptp(y, axis=0) * rng.normal(size=y.shape) for y in outputs]
-    model = gpi.identify(gpi.Record(runs, noisy, RATE), taps=40)
+    model = gpi.identify(gpi.Record(runs, noisy, RATE), taps=40, half_widths=12, thresholds=5)
     assert len(model.hysteresis) == 2
     held_out = drive(3000, 14, channels=2)
     truth = respond(held_out, system, [3.0, -1.0])

@@ -1,5 +1,6 @@
 """Pictures: drawn on the axes given, labelled with units, no state left behind."""
 
+import re
 from collections.abc import Iterator
 
 import matplotlib
@@ -178,8 +179,9 @@ def test_every_candidate_is_drawn_and_the_chosen_one_marked(model: gpi.Model) ->
     assert points.get_ydata().min() == 0
     [chosen] = [row for row in rows if row["chosen"]]
     assert list(ring.get_xdata()) == [chosen["used"]]
-    numbers = {text.get_text() for text in ax.texts}
-    assert f"{chosen['order']}/{chosen['plays']}/{chosen['deadzones']}/{chosen['delay']}" in numbers
+    *_, text = (text.get_text() for text in ax.get_legend().get_texts())
+    numbers = [int(number) for number in re.findall(r"\d+", text)]
+    assert numbers == [chosen[name] for name in ("order", "plays", "deadzones", "delay")]
     squares = ax.figure.axes[1].lines[0]
     np.testing.assert_allclose(squares.get_ydata(), [row["rms"] for row in rows])
 

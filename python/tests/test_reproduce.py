@@ -1,6 +1,7 @@
 """The paper's example against reference figures computed apart from this package, and a benchmark."""
 
 import hashlib
+import importlib
 import json
 from pathlib import Path
 
@@ -59,8 +60,13 @@ def test_the_refinement_removes_the_bias(name: str, found: Paper) -> None:
         assert np.isnan(reading.refined.weights_error)
 
 
-def test_the_command_prints_and_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_and_draws_it(
+    found: Paper, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     out = tmp_path / "out"
+    # the same example once more would take as long again
+    command = importlib.import_module("gpi_hammerstein.cli.reproduce.paper")
+    monkeypatch.setattr(command, "paper", lambda: found)
     assert run(["reproduce", "paper", "-o", str(out), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert [reading["reading"] for reading in result["readings"]] == list(REFERENCE)

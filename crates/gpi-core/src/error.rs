@@ -102,7 +102,7 @@ pub enum Error {
 
     /// The clock runs backwards or stands still.
     #[error(
-        "time stamps do not increase in {count} places, the first from {before} s in row {row} to \
+        "time stamps do not increase at {count} of the rows, first from {before} s in row {row} to \
          {after} s in the next; sort or cut the record there"
     )]
     TimeNotIncreasing {
@@ -162,7 +162,8 @@ pub enum Error {
     /// A system cannot be run backwards.
     #[error(
         "the linear model has a zero on the unit circle (distance {distance} at {frequency} rad per \
-         sample, tolerance {tolerance}); its inverse does not exist there"
+         sample, tolerance {tolerance}); its inverse does not exist there: leave the dynamics alone \
+         (`quasi_static`), or identify with another `order`"
     )]
     ZeroOnUnitCircle {
         /// Distance of the zero from the circle.

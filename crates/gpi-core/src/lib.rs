@@ -52,3 +52,8 @@ pub use record::{Channel, Experiment, Record, TimeAxis};
 /// A dense matrix of `f64`, stored by columns; signals are (samples, channels).
 #[cfg(feature = "identify")]
 pub type Matrix = nalgebra::DMatrix<f64>;
+
+/// The code of README is compiled with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+pub struct Readme;

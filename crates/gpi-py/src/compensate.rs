@@ -10,6 +10,15 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// A drive that makes a model's outputs follow a reference, see ``Model.compensate``.
+///
+/// Examples
+/// --------
+/// >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+/// >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+/// >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+/// >>> found = model.compensate(5.0 + np.sin(0.1 * np.arange(200)))
+/// >>> found.error["rms"] < 1e-9, found.drive.shape, found.lead
+/// (True, (200,), 0)
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Compensation {
     found: Found,
@@ -53,7 +62,8 @@ impl Compensation {
         from_signal(py, self.found.reference.clone(), self.one_dimensional)
     }
 
-    /// What the model says that the outputs do, without the effects that no input drives; the shape of the drive.
+    /// What the model says that the outputs do, without the effects that no input drives; the shape of the drive, in the
+    /// outputs' units.
     #[getter]
     fn predicted<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_signal(py, self.found.predicted.clone(), self.one_dimensional)
@@ -65,19 +75,22 @@ impl Compensation {
         self.found.lead
     }
 
-    /// Reference less prediction over the reference's own samples: rms and max in the output's unit, nrmse, fit_percent.
+    /// Reference less prediction over the reference's own samples.
+    ///
+    /// As ``Model.error``: ``rms`` and ``max`` in the output's unit, ``nrmse``, ``fit_percent``.
     #[getter]
     fn error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         figures(py, &self.found.error)
     }
 
-    /// What the outputs do for a drive in proportion to the reference, between the same extremes; the shape of the drive.
+    /// What the outputs do for a drive in proportion to the reference, the straight line through ``drive``, in the
+    /// outputs' units; the shape of the drive.
     #[getter]
     fn in_proportion<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_signal(py, self.found.in_proportion.clone(), self.one_dimensional)
     }
 
-    /// Reference less ``in_proportion``, as ``error``.
+    /// Reference less ``in_proportion``, as ``error`` (``rms`` and ``max`` in the output's unit).
     #[getter]
     fn error_in_proportion<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         figures(py, &self.found.error_in_proportion)
@@ -114,6 +127,16 @@ impl Compensation {
     }
 
     /// Draws the predicted output over the reference; see ``gpi_hammerstein.plot.compensation``.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Axes to draw on; those of a new figure when left out.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///     The axes.
     #[pyo3(signature = (ax = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,

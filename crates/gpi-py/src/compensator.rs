@@ -15,6 +15,16 @@ type State = CompensatorState<Vec<f64>, Vec<f64>>;
 /// ``u = D^-1[P^-1[v]]``, ``v = (r - offset - sum_i c_i l_i) / gain``, ``l_i(k+1) = l_i(k) + rate_i (v(k) - l_i(k))``:
 /// what the reference r, slow next to the dynamics, asks of hysteresis and creep. ``gpi export`` writes the same in C or
 /// in Rust.
+///
+/// Examples
+/// --------
+/// >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+/// >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+/// >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+/// >>> compensator = model.compensator(limits=(0.0, 10.0))
+/// >>> drive, state = compensator.run([5.0, 6.0, 5.0], compensator.standing_at(5.0))
+/// >>> drive.round(6).tolist()
+/// [4.0, 4.666667, 3.666667]
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Compensator {
     found: StreamingCompensator,
@@ -28,7 +38,7 @@ impl Compensator {
         InverseGpi::new(self.found.compensator.hysteresis().clone())
     }
 
-    /// DC gain from v to the output, creep apart, in the output's unit.
+    /// DC gain from v to the output, creep apart, in output units per unit of v.
     #[getter]
     fn gain(&self) -> f64 {
         self.found.compensator.gain()
@@ -40,13 +50,13 @@ impl Compensator {
         self.found.compensator.offset()
     }
 
-    /// By how much of their distance to v the lags of creep move a sample, ``1 - exp(-1 / (T_i rate))``, shape (lags,).
+    /// By what fraction of their distance to v the lags of creep move a sample, ``1 - exp(-1 / (T_i rate))``, shape (lags,).
     #[getter]
     fn creep_rates<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, self.found.compensator.creep().rates())
     }
 
-    /// c_i of creep, in the output's unit, shape (lags,).
+    /// c_i of creep, in output units per unit of v, shape (lags,).
     #[getter]
     fn creep_gains<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, self.found.compensator.creep().gains())
@@ -74,8 +84,8 @@ impl Compensator {
     /// Returns
     /// -------
     /// ndarray, shape (2 + plays + 2 lags,)
-    ///     The last drive, the number of samples out of reach, where plays and lags stand, what rounding took from the
-    ///     lags.
+    ///     The last drive, in the input's unit, the number of samples out of reach, where plays and lags stand and what
+    ///     rounding took from the lags, in the unit of v.
     fn standing_at<'py>(&self, py: Python<'py>, reference: f64) -> PyResult<Bound<'py, PyAny>> {
         if !reference.is_finite() {
             return Err(parameter(format!("`reference` = {reference} must be a finite number")));
@@ -90,12 +100,13 @@ impl Compensator {
     /// reference : array_like, shape (samples,)
     ///     What the output shall do, in its unit, at the model's rate; a sample that is not finite holds the drive.
     /// state : array_like, shape (2 + plays + 2 lags,)
-    ///     As ``standing_at`` or the last call returned it.
+    ///     As ``standing_at`` or the last call returned it, each in its own unit.
     ///
     /// Returns
     /// -------
     /// tuple of ndarray
-    ///     The drive, shape (samples,), in the input's unit, and the state.
+    ///     The drive, shape (samples,), in the input's unit, and the state, shape (2 + plays + 2 lags,), in the units that
+    ///     ``state`` has.
     fn run<'py>(
         &self,
         reference: &Bound<'py, PyAny>,

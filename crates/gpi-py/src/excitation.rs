@@ -29,7 +29,7 @@ use pyo3::prelude::*;
 /// Returns
 /// -------
 /// ndarray, shape (samples,)
-///     The drive signal.
+///     The drive signal, in the drive's unit.
 ///
 /// Raises
 /// ------
@@ -74,7 +74,7 @@ fn multisine(
 /// rate : float
 ///     Sampling rate in Hz.
 /// clock : float
-///     The signal may switch this often a second.
+///     The signal may switch this often a second, in Hz.
 /// range : tuple of float
 ///     The two levels, in the drive's unit.
 /// seed : int
@@ -85,7 +85,7 @@ fn multisine(
 /// Returns
 /// -------
 /// ndarray, shape (samples,)
-///     The drive signal.
+///     The drive signal, in the drive's unit.
 ///
 /// Raises
 /// ------
@@ -122,7 +122,7 @@ fn prbs(
 /// rate : float
 ///     Sampling rate in Hz.
 /// frequency : float
-///     Periods a second.
+///     Periods a second, in Hz.
 /// range : tuple of float
 ///     Smallest and largest value, in the drive's unit.
 /// slew : float, optional
@@ -131,7 +131,7 @@ fn prbs(
 /// Returns
 /// -------
 /// ndarray, shape (samples,)
-///     The drive signal.
+///     The drive signal, in the drive's unit.
 ///
 /// Raises
 /// ------

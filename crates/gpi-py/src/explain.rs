@@ -18,6 +18,15 @@ use pyo3::types::PyDict;
 /// What a record's model lacked: effects, errors before and after, and what is left.
 ///
 /// It comes from ``explain``.
+///
+/// Examples
+/// --------
+/// >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+/// >>> y = gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u) + np.random.default_rng(0).normal(0.0, 0.01, 2000)
+/// >>> record = gpi.Record(u, y, 1000.0)
+/// >>> found = gpi.explain(record, effects=[], delay=0, half_widths=[0.0, 2.0], thresholds=0)
+/// >>> found.effects, found.verdict
+/// ([], 'explained')
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Explanation {
     found: core::Explanation,
@@ -68,13 +77,15 @@ impl Explanation {
         self.record.clone_ref(py)
     }
 
-    /// Errors of the declared model: ``train`` and ``holdout``, each as ``Model.error`` returns it.
+    /// Errors of the declared model.
+    ///
+    /// ``train`` and ``holdout``, each as ``Model.error`` returns it (``rms`` and ``max`` in the output's unit).
     #[getter]
     fn before<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         errors_dict(py, &self.found.before)
     }
 
-    /// Errors with all effects; wrong samples that were found are not scored.
+    /// Errors with all effects, in the units of ``before``; wrong samples that were found are not scored.
     #[getter]
     fn after<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         errors_dict(py, &self.found.after)
@@ -86,9 +97,11 @@ impl Explanation {
         self.found.verdict.name()
     }
 
-    /// The declared model, then each effect: ``effect`` (None first), ``parameters`` (rows of ``name``,
-    /// ``value``, ``std``, ``unit``), ``evidence`` (``promised``, ``deviance``, ``chance``, ``dropped``),
-    /// ``train_rms``, ``holdout_rms``.
+    /// The declared model, then each effect.
+    ///
+    /// Rows of ``effect`` (None first), ``parameters`` (rows of ``name``, ``value`` and ``std`` in ``unit``, and ``unit``),
+    /// ``evidence`` (``promised``, a fraction of the residual's squares, ``deviance`` and what ``chance`` alone would give
+    /// of it, pure numbers, and ``dropped``, names), ``train_rms`` and ``holdout_rms`` (in the output's unit).
     #[getter]
     fn steps<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let step = |step: &core::Step| {
@@ -127,9 +140,10 @@ impl Explanation {
         self.found.models.iter().map(model).collect()
     }
 
-    /// A resonance that is elsewhere where the outputs swing more: rows of ``swing`` (rms of the outputs),
-    /// ``frequency`` and ``std`` (Hz) for the smallest and the largest swing; None where no loop was closed
-    /// around G, or no resonance moves.
+    /// A resonance that is elsewhere where the outputs swing more.
+    ///
+    /// Rows of ``swing`` (rms, in the outputs' unit), ``frequency`` and ``std`` (Hz) for the smallest and the largest swing;
+    /// None where no loop was closed around G, or no resonance moves.
     #[getter]
     fn moved_resonance<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<Bound<'py, PyDict>>>> {
         let Some(pair) = &self.found.moved_resonance else { return Ok(None) };
@@ -143,7 +157,9 @@ impl Explanation {
         pair.iter().map(row).collect::<PyResult<_>>().map(Some)
     }
 
-    /// Effects that were tried and not taken: ``effect``, ``holdout_rms``, ``why``, ``confounded_with``.
+    /// Effects that were tried and not taken.
+    ///
+    /// Rows of ``effect``, ``holdout_rms`` (in the output's unit), ``why``, ``confounded_with``.
     #[getter]
     fn rejected<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let one = |one: &core::Rejected| {
@@ -157,20 +173,21 @@ impl Explanation {
         self.found.rejected.iter().map(one).collect()
     }
 
-    /// Tests of what is left: ``name``, ``output``, ``statistic``, ``threshold``, ``p_value``, ``passed``,
-    /// ``points_to``.
+    /// Tests of what is left.
+    ///
+    /// Rows of ``name``, ``output``, ``statistic``, ``threshold`` and ``p_value`` (pure numbers), ``passed``, ``points_to``.
     #[getter]
     fn tests<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         test_rows(py, &self.found.tests, &self.found.model)
     }
 
-    /// The noise of each output, as ``Refinement.noise_floor``.
+    /// The noise of each output, in its unit, as ``Refinement.noise_floor``.
     #[getter]
     fn noise_floor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.refinement.bind(py).getattr("noise_floor")
     }
 
-    /// What to measure next: ``why`` and ``command``; None when nothing more is to be learnt.
+    /// What to measure next, with ``why`` and ``command``; None when nothing more is to be learnt.
     #[getter]
     fn next_experiment<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(next) = &self.found.next_experiment else { return Ok(None) };
@@ -180,19 +197,19 @@ impl Explanation {
         Ok(Some(row))
     }
 
-    /// Measured minus simulated output of the declared model, one (samples, outputs) an experiment.
+    /// Measured minus simulated output of the declared model, one (samples, outputs) an experiment, in the outputs' units.
     #[getter]
     fn residuals_before<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
         self.found.residuals_before.iter().map(|residual| from_matrix(py, residual)).collect()
     }
 
-    /// The same with all effects.
+    /// The same with all effects, one (samples, outputs) an experiment, in the outputs' units.
     #[getter]
     fn residuals_after<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
         self.found.residuals_after.iter().map(|residual| from_matrix(py, residual)).collect()
     }
 
-    /// Held-out samples of each experiment: pairs of first and one past the last.
+    /// Held-out samples of each experiment, as pairs of first and one past the last.
     #[getter]
     fn held_out(&self) -> Vec<Vec<(usize, usize)>> {
         let pairs = |blocks: &Vec<std::ops::Range<usize>>| {
@@ -207,7 +224,13 @@ impl Explanation {
         self.found.interrupted
     }
 
-    /// All of it as the JSON object ``gpi-explanation/1``.
+    /// All of it as a JSON object.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     The object ``gpi-explanation/1``: errors, parameters and residuals' tests in the units of the properties of
+    ///     the same names.
     fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let module = slf.py().import("gpi_hammerstein.explanation")?;
         module.call_method1("to_dict", (slf,))
@@ -249,13 +272,23 @@ impl Explanation {
         Ok(())
     }
 
-    /// Draws measured and simulated output over the input; see ``gpi_hammerstein.plot.loops``.
+    /// Draws the residual before and after; see ``gpi_hammerstein.plot.residual_in_time``.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Axes to draw on; those of a new figure when left out.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///     The axes.
     #[pyo3(signature = (ax = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,
         ax: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        plot("loops", slf.as_any(), ax)
+        plot("residual_in_time", slf.as_any(), ax)
     }
 
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
@@ -272,9 +305,9 @@ impl Explanation {
 /// Finds out what a record's model lacks, adds it, and reports the error before and after.
 ///
 /// The declared model (deadzones, plays, G) is identified without ten blocks of time that are kept for
-/// the test. Every candidate of the catalogue is ranked by a score test, the best few are fitted jointly
-/// with the model, and the one that explains most stays if it gains more than chance and the held-out
-/// blocks confirm it; until nothing more is confirmed.
+/// the test. Every candidate of the catalogue is ranked by a score test, (T7) in the theory, the best few
+/// are fitted jointly with the model, and the one that explains most stays if it gains more than chance,
+/// (T8), and the held-out blocks confirm it; until nothing more is confirmed.
 ///
 /// Parameters
 /// ----------
@@ -289,12 +322,14 @@ impl Explanation {
 ///     Names of effects that are added whatever they gain; the step's evidence tells what that is.
 /// order : int, optional
 ///     States of the linear part; a mode that it lacks is then an effect, and a delay too.
-/// half_widths, thresholds : int or array_like, optional
-///     How many plays and deadzones, or which ones.
+/// half_widths : int or array_like, shape (n,), optional
+///     How many plays, or their half-widths, in the unit of u; as in ``identify``.
+/// thresholds : int or array_like, shape (m,), optional
+///     How many deadzones, or their thresholds, in the unit of u; as in ``identify``.
 /// delay : int, optional
 ///     Makes G a gain with this delay, in samples.
-/// reading : str
-///     ``one-sided`` or ``directional`` deadzones.
+/// reading : {"one-sided", "directional"}
+///     How the deadzones are read, as in ``Deadzones``.
 /// progress : callable, optional
 ///     Called with a stage's name and the fraction done. An exception ends the search, as Ctrl-C does:
 ///     what was found so far is returned, with ``interrupted`` set; before the declared model is

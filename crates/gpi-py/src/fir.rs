@@ -8,6 +8,15 @@ use gpi_core::{Channel, Experiment, Matrix};
 use pyo3::prelude::*;
 
 /// A finite impulse response model: ``y(k) = sum_j H_j u(k-j) + offset``.
+///
+/// It comes from ``fir`` or ``FirStatistic.solve``.
+///
+/// Examples
+/// --------
+/// >>> u = np.random.default_rng(0).standard_normal(500)
+/// >>> response = gpi.fir(u, 2.0 * u, taps=3)
+/// >>> response.markov.shape, response.simulate([1.0, 0.0]).round(9).tolist()
+/// ((1, 1, 3), [2.0, 0.0])
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Fir {
     pub(crate) fir: linear::Fir,
@@ -21,31 +30,31 @@ impl Fir {
         from_matrices(py, self.fir.markov[0].shape(), &self.fir.markov)
     }
 
-    /// Constant term of each experiment, shape (experiments, outputs).
+    /// Constant term of each experiment, shape (experiments, outputs), in the outputs' units.
     #[getter]
     fn offsets<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrix(py, &self.fir.offsets)
     }
 
-    /// Singular values of the regressor (means removed), shape (taps * inputs,), descending.
+    /// Singular values of the regressor (means removed), shape (taps * inputs,), descending, in the inputs' units.
     #[getter]
     fn singular_values<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, &self.fir.singular_values)
     }
 
-    /// Largest over smallest singular value: by so much errors of the output may grow in the taps.
+    /// Largest over smallest singular value, a ratio by which errors of the output may grow in the taps.
     #[getter]
     fn condition(&self) -> f64 {
         self.fir.condition()
     }
 
-    /// Number of singular values above 1e-13 of the largest: what the input excites beyond rounding.
+    /// Number of singular values above 1e-13 of the largest, what the input excites beyond rounding.
     #[getter]
     fn rank(&self) -> usize {
         self.fir.rank
     }
 
-    /// Root mean square of the residual of each output, shape (outputs,).
+    /// Root mean square of the residual of each output, shape (outputs,), in its unit.
     #[getter]
     fn residual_rms<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, &self.fir.residual_rms)
@@ -57,7 +66,22 @@ impl Fir {
         self.fir.samples
     }
 
-    /// The output for u, shape (samples,) or (samples, inputs), from rest and without offset.
+    /// The output for u, from rest and without offset.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (samples,) or (samples, inputs)
+    ///     Input, in its unit.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (samples,) or (samples, outputs)
+    ///     y, in the outputs' units; a vector where u is one and there is one output.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     Another number of inputs.
     fn simulate<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (input, one_dimensional) = signal("u", u)?;
         let expected = self.fir.markov[0].ncols();
@@ -69,6 +93,16 @@ impl Fir {
     }
 
     /// Draws the Markov parameters; see ``gpi_hammerstein.plot.markov``.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Axes to draw on; those of a new figure when left out.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///     The axes.
     #[pyo3(signature = (ax = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,
@@ -96,11 +130,12 @@ impl Fir {
 /// Parameters
 /// ----------
 /// u, y : array_like, shape (samples,) or (samples, channels), or lists of arrays
-///     Input and output; lists hold one array an experiment, and each experiment has its own offset.
+///     Input and output, each channel in its own unit; lists hold one array an experiment, and each experiment has its
+///     own offset.
 /// taps : int
 ///     Number of Markov parameters, mu + 1 in the paper.
 /// ridge : float
-///     Zero is plain least squares. A positive value, relative to the mean eigenvalue of the normal
+///     Zero is plain least squares. A positive value, a ratio to the mean eigenvalue of the normal
 ///     equations, leaves out what the input hardly excites (three passes of iterated ridge
 ///     regression).
 ///
@@ -204,13 +239,25 @@ impl FirStatistic {
         self.statistic.taps()
     }
 
-    /// Rows of the regression so far: samples whose past of ``taps - 1`` samples is known.
+    /// Rows of the regression so far, the samples whose past of ``taps - 1`` samples is known.
     #[getter]
     fn samples(&self) -> usize {
         self.statistic.samples()
     }
 
-    /// Takes the next samples of the present experiment, each (samples,) or (samples, channels).
+    /// Takes the next samples of the present experiment.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (samples,) or (samples, inputs)
+    ///     Input, in its unit.
+    /// y : array_like, shape (samples,) or (samples, outputs)
+    ///     Output, in its unit.
+    ///
+    /// Raises
+    /// ------
+    /// DataError
+    ///     Another number of channels, unequal lengths.
     fn push(&mut self, py: Python<'_>, u: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> PyResult<()> {
         let ((input, _), (output, _)) = (signal("u", u)?, signal("y", y)?);
         py.detach(|| self.statistic.push(&input, &output)).map_err(to_python)
@@ -222,11 +269,38 @@ impl FirStatistic {
     }
 
     /// Adds what another one has gathered; the present experiments of both end.
+    ///
+    /// Parameters
+    /// ----------
+    /// other : FirStatistic
+    ///     One of as many taps, inputs and outputs.
+    ///
+    /// Raises
+    /// ------
+    /// DataError
+    ///     Another number of taps, inputs or outputs.
     fn merge(&mut self, other: &Self) -> PyResult<()> {
         self.statistic.merge(other.statistic.clone()).map_err(to_python)
     }
 
-    /// The least squares estimate from all samples so far; ``ridge`` as for ``fir``.
+    /// The least squares estimate from all samples so far.
+    ///
+    /// Parameters
+    /// ----------
+    /// ridge : float
+    ///     As for ``fir``: zero, or a ratio to the mean eigenvalue of the normal equations.
+    ///
+    /// Returns
+    /// -------
+    /// Fir
+    ///     The estimate.
+    ///
+    /// Raises
+    /// ------
+    /// DataError
+    ///     Fewer samples than unknowns.
+    /// ParameterError
+    ///     A negative ridge.
     #[pyo3(signature = (*, ridge = 0.0))]
     fn solve(&self, py: Python<'_>, ridge: f64) -> PyResult<Fir> {
         Ok(Fir { fir: py.detach(|| self.statistic.solve(ridge)).map_err(to_python)? })

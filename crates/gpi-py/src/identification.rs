@@ -8,6 +8,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// How a model was identified.
+///
+/// Examples
+/// --------
+/// >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+/// >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+/// >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+/// >>> [(row["order"], row["plays"]) for row in model.identification.candidates]
+/// [(0, 2)]
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Identification {
     pub(crate) found: core::Identification,
@@ -21,7 +29,8 @@ impl Identification {
         self.found.fir.clone().map(|fir| Fir { fir })
     }
 
-    /// Singular values of ERA's Hankel matrix in the best round, descending.
+    /// Singular values of ERA's Hankel matrix in the best round, shape (n,), descending, in output units per unit of v;
+    /// none where the input excites no more than gain and delay.
     #[getter]
     fn singular_values<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, &self.found.singular_values)
@@ -45,7 +54,7 @@ impl Identification {
         self.found.delay
     }
 
-    /// What was left after each round: ``rms`` (training data, output's unit), ``order``, ``taps``.
+    /// What was left after each round, rows of ``rms`` (training data, in the output's unit), ``order``, ``taps``.
     #[getter]
     fn rounds<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let row = |round: &core::Round| {
@@ -58,9 +67,10 @@ impl Identification {
         self.found.rounds.iter().map(row).collect()
     }
 
-    /// The structures that were compared, in the order they were tried: ``delay``, ``order``, ``plays``,
-    /// ``deadzones``, ``rms``, ``parameters``, ``used`` (the same, counted in samples of white noise), ``criterion``
-    /// (``N ln rms^2 + used ln N``, the least is chosen), ``chosen``.
+    /// The structures that were compared, in the order they were tried.
+    ///
+    /// Rows of ``delay``, ``order``, ``plays``, ``deadzones``, ``rms`` (in the output's unit), ``parameters``, ``used`` (the
+    /// same, counted in samples of white noise), ``criterion`` (``N ln rms^2 + used ln N``, the least is chosen), ``chosen``.
     #[getter]
     fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let row = |(place, candidate): (usize, &core::Candidate)| {
@@ -92,6 +102,16 @@ impl Identification {
     }
 
     /// Draws the structures that were compared; see ``gpi_hammerstein.plot.candidates``.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Axes for the criterion; those of a new figure when left out.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///     The criterion's axes.
     #[pyo3(signature = (ax = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,

@@ -69,6 +69,16 @@ fn in_part<T: Send>(
 }
 
 /// A hysteresis fitted to an input and an intermediate signal.
+///
+/// It comes from ``fit_hysteresis``.
+///
+/// Examples
+/// --------
+/// >>> u = 4 * np.sin(0.01 * np.arange(2000)) * np.linspace(1, 0.5, 2000)
+/// >>> v = gpi.PlayBank([0.0, 1.0], [1.0, 0.5])(u)
+/// >>> fit = gpi.fit_hysteresis(u, v, half_widths=[0.0, 1.0], thresholds=0)
+/// >>> fit.gpi.plays.weights.round(6).tolist()
+/// [1.0, 0.5]
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct HysteresisFit {
     fit: core::HysteresisFit,
@@ -82,13 +92,13 @@ impl HysteresisFit {
         Gpi { hysteresis: self.fit.hysteresis.clone() }
     }
 
-    /// Constant that v carries on top.
+    /// Constant that v carries on top, in the unit of v.
     #[getter]
     fn offset(&self) -> f64 {
         self.fit.offset
     }
 
-    /// F(-1) of the plays, in the order of their half-widths.
+    /// F(-1) of the plays, shape (n,), in the order of their half-widths, in the unit of u.
     #[getter]
     fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, &self.fit.start)
@@ -100,13 +110,13 @@ impl HysteresisFit {
         self.fit.rms
     }
 
-    /// Root mean square error before every accepted step, then at the end.
+    /// Root mean square error before every accepted step, then at the end, shape (steps + 1,), in the unit of v.
     #[getter]
     fn history<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, &self.fit.history)
     }
 
-    /// How the fit ended: ``converged``, ``stalled`` or ``limit``.
+    /// How the fit ended, ``converged``, ``stalled`` or ``limit``.
     #[getter]
     fn status(&self) -> &'static str {
         self.fit.status.name()
@@ -131,12 +141,12 @@ impl HysteresisFit {
 /// Parameters
 /// ----------
 /// u, v : array_like, shape (samples,)
-///     Input and intermediate signal.
-/// half_widths : int or array_like, optional
+///     Input and intermediate signal, each in its own unit.
+/// half_widths : int or array_like, shape (n,), optional
 ///     How many to spread over half the span of u, or which ones, in the unit of u; 24 when left out.
 ///     Zero is always among them.
-/// thresholds : int or array_like, optional
-///     How many to spread inside the range of u, or which ones; 10 when left out.
+/// thresholds : int or array_like, shape (m,), optional
+///     How many to spread inside the range of u, or which ones, in the unit of u; 10 when left out.
 /// progress : callable, optional
 ///     Called with a stage's name and the fraction done; an exception stops the fit.
 ///
@@ -183,7 +193,8 @@ fn fit_hysteresis(
 /// Identifies a model from a record.
 ///
 /// G comes from FIR least squares and ERA, the hysteresis from bounded least squares behind G, and
-/// both are repeated until nothing is gained. An input that excites few directions (a sine, say)
+/// both are repeated until nothing is gained; then all parts are refined together, (T3) in the theory, and the
+/// structures are compared, (T4). An input that excites few directions (a sine, say)
 /// supports a gain and a delay only; ``model.identification.notes`` says so.
 ///
 /// Parameters
@@ -194,12 +205,20 @@ fn fit_hysteresis(
 ///     Taps of the FIR estimate; chosen from the slowest pole when left out.
 /// order : int, optional
 ///     Order of G; chosen by an information criterion when left out.
-/// half_widths : int or array_like, optional
-///     How many plays to spread over half the span, or their half-widths; 24 when left out.
-/// thresholds : int or array_like, optional
-///     How many deadzones to spread inside the range, or their thresholds; 10 when left out.
+/// half_widths : int or array_like, shape (n,), optional
+///     How many plays to spread over half the span of u at first, or their half-widths, in the unit of u,
+///     which then do not move; chosen by the criterion from 24 down when left out.
+/// thresholds : int or array_like, shape (m,), optional
+///     How many deadzones to spread inside the range of u at first, or their thresholds, in the unit of u,
+///     which then do not move; chosen by the criterion from 10 down when left out.
+/// reading : {"one-sided", "directional"}
+///     How the deadzones are read, as in ``Deadzones``.
 /// delay : int, optional
 ///     Restricts G to a gain with a delay of this many samples.
+/// robust : bool, optional
+///     As in ``refine``: Huber's loss instead of squares.
+/// offset_knots : int
+///     As in ``refine``: knots of a slowly varying offset of each experiment.
 /// progress : callable, optional
 ///     Called with a stage's name and the fraction done; an exception stops the work.
 ///

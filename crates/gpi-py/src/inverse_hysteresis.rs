@@ -9,10 +9,16 @@ use pyo3::prelude::*;
 use std::ffi::CString;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The exact inverse of a cascade: ``u = D^-1[P^-1[v]]``, see [`Gpi.inverse`].
+/// The exact inverse of a cascade: ``u = D^-1[P^-1[v]]``, see ``Gpi.inverse``.
 ///
 /// P^-1 are plays and D^-1 deadzones. What the limits do not reach is clamped: the drive stops at its limit, and the
 /// plays go on from there as they do forwards.
+///
+/// Methods
+/// -------
+/// __call__(v)
+///     u from rest, for a signal v of shape (samples,) or (samples, channels) in the unit of v; u is shaped like v, in its
+///     own unit. Warns (``UserWarning``) where v is out of reach.
 ///
 /// Examples
 /// --------
@@ -39,8 +45,10 @@ impl InverseGpi {
         Deadzones { envelope: self.inverse.envelope().clone() }
     }
 
-    /// D^-1 as a curve: knots, shape (m,), the drive at each, shape (m,), and the slopes before the first one and behind
-    /// each, shape (m + 1,).
+    /// D^-1 as a curve.
+    ///
+    /// The knots, shape (m,), in the unit of z; the drive at each, shape (m,), in the unit of u; the slopes before the first
+    /// one and behind each, shape (m + 1,), in units of u per unit of z.
     #[getter]
     fn curve<'py>(&self, py: Python<'py>) -> [Bound<'py, PyAny>; 3] {
         let curve = self.inverse.curve();
@@ -48,27 +56,24 @@ impl InverseGpi {
         [curve.knots(), curve.heights(), &slopes].map(|values| from_vector(py, values))
     }
 
-    /// The lowest and the highest drive u; infinite where there is no limit.
+    /// The lowest and the highest drive u, in the unit of u; infinite where there is no limit.
     #[getter]
     fn limits(&self) -> (f64, f64) {
         self.inverse.drive().into()
     }
 
-    /// The lowest and the highest z, the envelope's outputs at these drives.
+    /// The lowest and the highest z, the envelope's outputs at these drives, in the unit of z.
     #[getter]
     fn reach(&self) -> (f64, f64) {
         self.inverse.reach().into()
     }
 
-    /// The lowest and the highest v that are within reach wherever the plays stand.
+    /// The lowest and the highest v, in the unit of v, that are within reach wherever the plays stand.
     #[getter]
     fn safe(&self) -> (f64, f64) {
         self.inverse.safe().into()
     }
 
-    /// The drive for a signal v, shape (samples,) or (samples, channels), from rest.
-    ///
-    /// Warns (``UserWarning``) where v is out of reach.
     fn __call__<'py>(&self, v: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let out_of_reach = AtomicU64::new(0);
         let (u, _) = self.drive(v, None, &out_of_reach)?;
@@ -88,7 +93,7 @@ impl InverseGpi {
     /// Parameters
     /// ----------
     /// v : array_like, shape (samples,) or (samples, channels)
-    ///     What the cascade shall give; each channel has a state of its own.
+    ///     What the cascade shall give, in the unit of v; each channel has a state of its own.
     /// state : array_like, shape (1 + n,) or (1 + n, channels), optional
     ///     The number of samples that were out of reach, then where the plays stand, in the unit of v; zeros (rest)
     ///     when left out.
@@ -96,7 +101,8 @@ impl InverseGpi {
     /// Returns
     /// -------
     /// tuple of ndarray
-    ///     u in the shape of v, and the state, shape (1 + n,) or (1 + n, channels).
+    ///     u in the shape of v, in its own unit, and the state, shape (1 + n,) or (1 + n, channels), in the units that
+    ///     ``state`` has.
     #[pyo3(signature = (v, state = None))]
     fn run<'py>(
         &self,

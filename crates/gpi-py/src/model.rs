@@ -21,6 +21,16 @@ use pyo3::types::PyDict;
 /// A Hammerstein model: ``y = G(q) P[D[u]] + offset``, one hysteresis per input.
 ///
 /// It comes from ``identify``, ``load`` or ``Model.from_json``.
+///
+/// Examples
+/// --------
+/// >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+/// >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+/// >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+/// >>> model
+/// Model(u -> y, 1 deadzones, 2 plays, linear order 0, 1000 Hz)
+/// >>> model.error(record)["fit_percent"] > 99
+/// True
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Model {
     pub(crate) model: gpi_core::Model,
@@ -163,8 +173,9 @@ impl Model {
         self.refinement.as_ref().map(|refinement| refinement.clone_ref(py))
     }
 
-    /// The effects of the catalogue that the model has, in the order of the chain: ``name``, and
-    /// ``parameters`` (rows of ``name``, ``value``, ``unit``).
+    /// The effects of the catalogue that the model has, in the order of the chain.
+    ///
+    /// Rows of ``name`` and ``parameters`` (rows of ``name``, ``value`` in ``unit``, and ``unit``, empty for a pure number).
     #[getter]
     fn effects<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let describe = |effect: &gpi_core::effects::Effect| {
@@ -183,11 +194,23 @@ impl Model {
         self.model.effects().iter().map(describe).collect()
     }
 
-    /// The output for u, shape (samples,) or (samples, inputs).
+    /// The output for u.
     ///
     /// The actuator is taken to have been raised from zero to the first sample once, and to have stood
-    /// there before. Use ``start`` and ``run`` for another past. ``covariates``, shape (samples,) or
-    /// (samples, columns), are other measured columns that an effect of the model may let leak in.
+    /// there before. Use ``start`` and ``run`` for another past.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (samples,) or (samples, inputs)
+    ///     Input, in its unit.
+    /// covariates : array_like, shape (samples,) or (samples, columns), optional
+    ///     Other measured columns, each in its own unit, that an effect of the model may let leak in; zero when
+    ///     left out.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (samples,) or (samples, outputs)
+    ///     y, in the outputs' units; a vector where u is one and there is one output.
     #[pyo3(signature = (u, *, covariates = None))]
     fn simulate<'py>(
         &self,
@@ -202,14 +225,35 @@ impl Model {
         Ok(from_signal(u.py(), output.map_err(to_python)?, one_dimensional))
     }
 
-    /// The intermediate signal v that belongs to ``simulate``, shaped like u.
+    /// The intermediate signal v that belongs to ``simulate``.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (samples,) or (samples, inputs)
+    ///     Input, in its unit.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shaped like u
+    ///     v, in the output's unit; that of the output to which G has the largest DC gain, where there are several.
     fn intermediate<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (input, one_dimensional) = signal("u", u)?;
         let v = self.model.intermediate(&input).map_err(to_python)?;
         Ok(from_signal(u.py(), v, one_dimensional))
     }
 
-    /// The state of an actuator that was raised from zero to u, shape (inputs,), and stands there.
+    /// The state of an actuator that was raised from zero to u, and stands there.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (inputs,)
+    ///     What each input stands at, in its unit.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (states,)
+    ///     For ``run``: the previous input and the play outputs of every input, then the states of G, then what
+    ///     effects remember; each in its own unit.
     fn start<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let state = self.model.start(&vector("u", u)?).map_err(to_python)?;
         Ok(from_vector(u.py(), &Self::write(&state)))
@@ -220,14 +264,15 @@ impl Model {
     /// Parameters
     /// ----------
     /// u : array_like, shape (samples,) or (samples, inputs)
-    ///     Input.
-    /// state : array_like
-    ///     What ``start`` or an earlier ``run`` returned.
+    ///     Input, in its unit.
+    /// state : array_like, shape (states,)
+    ///     What ``start`` or an earlier ``run`` returned, each in its own unit.
     ///
     /// Returns
     /// -------
     /// tuple of ndarray
-    ///     y, and the state.
+    ///     y, shape (samples,) or (samples, outputs), in the outputs' units, and the state, shape (states,), in the
+    ///     units that ``state`` has.
     fn run<'py>(
         &self,
         u: &Bound<'py, PyAny>,
@@ -255,8 +300,8 @@ impl Model {
     /// Returns
     /// -------
     /// dict
-    ///     ``rms`` and ``max`` in the output's unit, ``nrmse`` (rms over span), ``fit_percent``
-    ///     (100 (1 - |e| / |y - mean y|)).
+    ///     ``rms`` and ``max`` in the output's unit, ``nrmse`` (rms over span, a ratio), ``fit_percent``
+    ///     (``100 (1 - |e| / |y - mean y|)``, in percent).
     #[pyo3(signature = (record, *, remove_mean = false, fit_start = false))]
     fn error<'py>(
         &self,
@@ -349,8 +394,19 @@ impl Model {
         self.model.compensator(limits).map(Compensator::new).map_err(to_python)
     }
 
-    /// Measured minus simulated output of each experiment, each of shape (samples, outputs);
-    /// ``fit_start`` as in ``error``.
+    /// Measured minus simulated output of each experiment.
+    ///
+    /// Parameters
+    /// ----------
+    /// record : Record
+    ///     Measured input and output.
+    /// fit_start : bool
+    ///     As in ``error``: fit what was before the first sample of experiments that begin in motion.
+    ///
+    /// Returns
+    /// -------
+    /// list of ndarray, each of shape (samples, outputs)
+    ///     The residual of each experiment, its warm-up included, in the outputs' units.
     #[pyo3(signature = (record, *, fit_start = false))]
     fn residual<'py>(
         &self,
@@ -362,12 +418,32 @@ impl Model {
         Ok(residuals.iter().map(|residual| from_matrix(py, residual)).collect())
     }
 
-    /// The model as JSON (``gpi-model/1``).
+    /// The model as JSON.
+    ///
+    /// Returns
+    /// -------
+    /// str
+    ///     A text of the schema ``gpi-model/1``.
     fn to_json(&self) -> PyResult<String> {
         self.model.to_json().map_err(to_python)
     }
 
-    /// Reads what ``to_json`` wrote; raises DataError for another schema.
+    /// Reads what ``to_json`` wrote.
+    ///
+    /// Parameters
+    /// ----------
+    /// text : str
+    ///     JSON of the schema ``gpi-model/1``.
+    ///
+    /// Returns
+    /// -------
+    /// Model
+    ///     The model; its ``identification`` and ``refinement`` are not stored and hence None.
+    ///
+    /// Raises
+    /// ------
+    /// DataError
+    ///     Another schema, a text that is no model.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         let model = gpi_core::Model::from_json(text).map_err(to_python)?;
@@ -375,6 +451,16 @@ impl Model {
     }
 
     /// Writes the model to a JSON file; a file of that name is replaced as a whole.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     The file, such as ``model.json``.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     The folder does not exist or cannot be written.
     fn save(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         let files = slf.py().import("gpi_hammerstein.files")?;
         files.call_method1("save_model", (slf, path))?;
@@ -382,6 +468,18 @@ impl Model {
     }
 
     /// Draws measured and simulated output; see ``gpi_hammerstein.plot.fit``.
+    ///
+    /// Parameters
+    /// ----------
+    /// record : Record
+    ///     A record at the model's rate.
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Axes to draw on; those of a new figure when left out.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///     The axes.
     #[pyo3(signature = (record, ax = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,

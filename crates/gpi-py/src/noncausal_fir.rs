@@ -6,7 +6,21 @@ use gpi_core::linear;
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
 
-/// A noncausal FIR inverse: ``v(k) = sum_{i=-d}^{r} h_i y(k-i)``.
+/// A noncausal FIR inverse: ``v(k) = sum_{i=-d}^{r} h_i y(k-i)`` (equation 46 of the paper).
+///
+/// It comes from ``StateSpace.noncausal_inverse``.
+///
+/// Methods
+/// -------
+/// __call__(y)
+///     The intermediate signal of y (equation 47), of shape (samples,) or (samples, outputs) in the outputs' units.
+///
+/// Examples
+/// --------
+/// >>> delay = gpi.StateSpace([[0.0]], [[1.0]], [[1.0]], [[0.0]])
+/// >>> inverse = delay.noncausal_inverse()
+/// >>> inverse.r, inverse.d, inverse.taps.round(9).tolist()
+/// (0, 1, [[[1.0, 0.0]]])
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct NoncausalFir {
     pub(crate) inverse: linear::NoncausalFir,
@@ -14,7 +28,7 @@ pub(crate) struct NoncausalFir {
 
 #[pymethods]
 impl NoncausalFir {
-    /// h_{-d} .. h_r, shape (inputs of G, outputs of G, d + r + 1).
+    /// h_{-d} .. h_r, shape (inputs, outputs, d + r + 1), those of G, in units of v per output unit.
     #[getter]
     fn taps<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrices(py, self.inverse.taps[0].shape(), &self.inverse.taps)
@@ -26,19 +40,18 @@ impl NoncausalFir {
         self.inverse.causal()
     }
 
-    /// Noncausal taps: samples of preview.
+    /// Noncausal taps, the samples of preview.
     #[getter]
     fn d(&self) -> usize {
         self.inverse.noncausal
     }
 
-    /// Norm of the taps left out as a fraction of all; it bounds the relative error of the response.
+    /// Norm of the taps left out as a fraction of all, (T2) in the theory; it bounds the relative error of the response.
     #[getter]
     fn error(&self) -> f64 {
         self.inverse.error
     }
 
-    /// The intermediate signal of y, shape (samples,) or (samples, outputs) (equation 47).
     fn __call__(&self, y: &Bound<'_, PyAny>) -> PyResult<IntermediateSignal> {
         let (output, one_dimensional) = signal("y", y)?;
         let signal = self.inverse.apply(&output).map_err(to_python)?;
@@ -51,6 +64,15 @@ impl NoncausalFir {
 }
 
 /// An intermediate signal seen through the inverse.
+///
+/// It comes from a call of ``NoncausalFir``.
+///
+/// Examples
+/// --------
+/// >>> delay = gpi.StateSpace([[0.0]], [[1.0]], [[1.0]], [[0.0]])
+/// >>> seen = delay.noncausal_inverse()([0.0, 1.0, 2.0])
+/// >>> seen.values.round(9).tolist(), seen.valid
+/// ([1.0, 2.0, 2.0], slice(0, 2, 1))
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct IntermediateSignal {
     signal: linear::IntermediateSignal,
@@ -59,7 +81,8 @@ pub(crate) struct IntermediateSignal {
 
 #[pymethods]
 impl IntermediateSignal {
-    /// v-hat, shaped like the output it was computed from.
+    /// v-hat, shaped like the output it was computed from, in the unit of v; near the ends that output is continued by its
+    /// end values.
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_signal(py, self.signal.values.clone(), self.one_dimensional)

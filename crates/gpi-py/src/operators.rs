@@ -27,6 +27,12 @@ type Envelope = operators::Deadzones<Vec<f64>>;
 /// ParameterError
 ///     Unequal lengths, values that are not finite, negative half-widths.
 ///
+/// Methods
+/// -------
+/// __call__(z, *, threads=1)
+///     v from rest, for a signal z of shape (samples,) or (samples, channels) in the input's unit; v is shaped like z, in
+///     its own unit. ``threads`` as in ``run``.
+///
 /// Examples
 /// --------
 /// >>> import gpi_hammerstein as gpi
@@ -52,16 +58,13 @@ impl PlayBank {
         from_vector(py, self.bank.half_widths())
     }
 
-    /// Weights p_i, shape (n,).
+    /// Weights p_i, shape (n,), in output units per input unit.
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, self.bank.weights())
     }
 
-    /// The output of a signal z, shape (samples,) or (samples, channels), from rest.
-    ///
-    /// ``threads`` > 1 cuts the time of each channel into so many stretches that run at once; it pays from about a
-    /// million samples on.
+    // Python shows no text of a call: the class has it.
     #[pyo3(signature = (z, *, threads = 1))]
     fn __call__<'py>(&self, z: &Bound<'py, PyAny>, threads: usize) -> PyResult<Bound<'py, PyAny>> {
         Ok(self.run(z, None, threads)?.0)
@@ -72,16 +75,17 @@ impl PlayBank {
     /// Parameters
     /// ----------
     /// z : array_like, shape (samples,) or (samples, channels)
-    ///     Input; each channel has plays of its own.
+    ///     Input, in its unit; each channel has plays of its own.
     /// state : array_like, shape (n,) or (n, channels), optional
     ///     Play outputs F_i(-1) in the input's unit; zeros (rest) when left out.
     /// threads : int
-    ///     Stretches of time that run at once.
+    ///     Stretches into which the time of each channel is cut, and which run at once; more than one pays from about a
+    ///     million samples on.
     ///
     /// Returns
     /// -------
     /// tuple of ndarray
-    ///     v in the shape of z, and the state, shape (n,) or (n, channels).
+    ///     v in the shape of z, in its own unit, and the state, shape (n,) or (n, channels), in the input's unit.
     #[pyo3(signature = (z, state = None, *, threads = 1))]
     fn run<'py>(
         &self,
@@ -104,7 +108,7 @@ impl PlayBank {
         })
     }
 
-    /// The bank that undoes this one, its plays from narrow to wide (Kuhnen 2003).
+    /// The bank that undoes this one, its plays from narrow to wide (Kuhnen 2003), (T9) in the theory.
     ///
     /// With P_i = p_0 + .. + p_i: half-widths ``r'_i = sum_{j<=i} p_j (r_i - r_j)``, weights ``p'_0 = 1/P_0`` and
     /// ``p'_i = 1/P_i - 1/P_{i-1}``.
@@ -176,7 +180,7 @@ fn sum(bank: &Bank) -> f64 {
 /// thresholds : array_like, shape (m,)
 ///     eta_j, in the input's unit, of either sign.
 /// weights : array_like, shape (m,)
-///     g_j, of either sign.
+///     g_j, of either sign, in units of z per unit of u.
 /// reading : {"one-sided", "directional"}
 ///     "one-sided" is the usual memoryless deadzone (eta > 0: max(u - eta, 0); eta < 0:
 ///     min(u - eta, 0); eta = 0: u). "directional" is the paper's (3) exactly as printed, which also
@@ -186,6 +190,12 @@ fn sum(bank: &Bank) -> f64 {
 /// ------
 /// ParameterError
 ///     Unequal lengths, values that are not finite, an unknown reading.
+///
+/// Methods
+/// -------
+/// __call__(u)
+///     z from rest (previous input zero), shape (samples,), in its own unit, for a signal u, shape (samples,), in the
+///     input's unit.
 ///
 /// Examples
 /// --------
@@ -232,7 +242,7 @@ impl Deadzones {
         from_vector(py, self.envelope.thresholds())
     }
 
-    /// Weights g_j, shape (m,).
+    /// Weights g_j, shape (m,), in units of z per unit of u.
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, self.envelope.weights())
@@ -244,7 +254,6 @@ impl Deadzones {
         reading_name(self.envelope.reading())
     }
 
-    /// The output of a signal u, shape (samples,), from rest (previous input zero).
     fn __call__<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         Ok(self.run(u, None)?.0)
     }
@@ -254,14 +263,14 @@ impl Deadzones {
     /// Parameters
     /// ----------
     /// u : array_like, shape (samples,)
-    ///     Input.
+    ///     Input, in its unit.
     /// previous : float, optional
-    ///     u(-1), which only the directional reading looks at; zero when left out.
+    ///     u(-1), in the unit of u, which only the directional reading looks at; zero when left out.
     ///
     /// Returns
     /// -------
     /// tuple of ndarray and float
-    ///     z, shape (samples,), and the last input.
+    ///     z, shape (samples,), in its own unit, and the last input, in the unit of u.
     #[pyo3(signature = (u, previous = None))]
     fn run<'py>(
         &self,
@@ -299,6 +308,12 @@ impl Deadzones {
 /// plays : PlayBank
 ///     P.
 ///
+/// Methods
+/// -------
+/// __call__(u)
+///     v from rest, for a signal u of shape (samples,) or (samples, channels) in the input's unit; v is shaped like u, in
+///     its own unit.
+///
 /// Examples
 /// --------
 /// >>> import gpi_hammerstein as gpi
@@ -329,7 +344,6 @@ impl Gpi {
         PlayBank { bank: self.hysteresis.plays().clone() }
     }
 
-    /// The output of a signal u, shape (samples,) or (samples, channels), from rest.
     fn __call__<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         Ok(self.run(u, None)?.0)
     }
@@ -339,14 +353,15 @@ impl Gpi {
     /// Parameters
     /// ----------
     /// u : array_like, shape (samples,) or (samples, channels)
-    ///     Input; each channel has a state of its own.
+    ///     Input, in its unit; each channel has a state of its own.
     /// state : array_like, shape (1 + n,) or (1 + n, channels), optional
-    ///     The previous input, then the play outputs; zeros (rest) when left out.
+    ///     The previous input, in the unit of u, then the play outputs, in the unit of z; zeros (rest) when left out.
     ///
     /// Returns
     /// -------
     /// tuple of ndarray
-    ///     v in the shape of u, and the state, shape (1 + n,) or (1 + n, channels).
+    ///     v in the shape of u, in its own unit, and the state, shape (1 + n,) or (1 + n, channels), in the units that
+    ///     ``state`` has.
     #[pyo3(signature = (u, state = None))]
     fn run<'py>(
         &self,
@@ -391,12 +406,12 @@ impl Gpi {
     /// Parameters
     /// ----------
     /// state : array_like, shape (1 + n,)
-    ///     What [`Gpi.run`] returned.
+    ///     What ``run`` returned: the previous input, in the unit of u, then the play outputs, in the unit of z.
     ///
     /// Returns
     /// -------
     /// ndarray, shape (1 + n,)
-    ///     For [`InverseGpi.run`]: no sample out of reach yet, then where its plays stand, in the unit of v.
+    ///     For ``InverseGpi.run``: no sample out of reach yet, then where its plays stand, in the unit of v.
     ///
     /// Raises
     /// ------

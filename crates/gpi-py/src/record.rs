@@ -11,11 +11,11 @@ use pyo3::prelude::*;
 /// Parameters
 /// ----------
 /// u, y : array_like, shape (samples,) or (samples, channels), or a list of arrays
-///     Input and output; a list of arrays holds one array an experiment.
+///     Input and output, each channel in its own unit; a list of arrays holds one array an experiment.
 /// rate : float
 ///     Sampling rate in Hz.
-/// covariates : like u, optional
-///     Other measured columns.
+/// covariates : array_like, shape (samples,) or (samples, columns), or a list of arrays, optional
+///     Other measured columns, each in its own unit.
 /// warmup : int or list of int, optional
 ///     Samples at the start of each experiment that drive the model but are not scored; none when left
 ///     out.
@@ -125,19 +125,19 @@ impl Record {
         Ok(Self { record: record.map_err(to_python)? })
     }
 
-    /// Input of each experiment, each of shape (samples, inputs).
+    /// Input of each experiment, each of shape (samples, inputs), in the inputs' units.
     #[getter]
     fn u<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
         self.record.experiments().iter().map(|e| from_matrix(py, &e.input)).collect()
     }
 
-    /// Output of each experiment, each of shape (samples, outputs).
+    /// Output of each experiment, each of shape (samples, outputs), in the outputs' units.
     #[getter]
     fn y<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
         self.record.experiments().iter().map(|e| from_matrix(py, &e.output)).collect()
     }
 
-    /// Other measured columns of each experiment, each of shape (samples, covariates).
+    /// Other measured columns of each experiment, each of shape (samples, covariates), in their units.
     #[getter]
     fn covariates<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
         self.record.experiments().iter().map(|e| from_matrix(py, &e.covariates)).collect()
@@ -202,7 +202,7 @@ impl Record {
     /// Parameters
     /// ----------
     /// fraction : float
-    ///     Share of the scored samples that goes into the first record, between 0 and 1.
+    ///     Share of the scored samples that goes into the first record, a fraction between 0 and 1.
     ///
     /// Returns
     /// -------
@@ -215,6 +215,16 @@ impl Record {
     }
 
     /// Draws inputs and outputs over time; see ``gpi_hammerstein.plot.record``.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Axes for the outputs; those of a new figure when left out.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///     The outputs' axes.
     #[pyo3(signature = (ax = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,

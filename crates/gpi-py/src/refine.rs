@@ -14,6 +14,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// How a model was refined, and how sure its parameters are.
+///
+/// Examples
+/// --------
+/// >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+/// >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+/// >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+/// >>> [row["name"] for row in model.refinement.parameters[:2]]
+/// ['u.weights[0]', 'u.weights[1]']
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Refinement {
     pub(crate) refinement: core::Refinement,
@@ -28,20 +36,20 @@ impl Refinement {
 
 #[pymethods]
 impl Refinement {
-    /// How it ended: ``converged``; ``stalled`` (no shorter step helps); ``limit`` (of steps).
+    /// How it ended, ``converged``, ``stalled`` (no shorter step helps) or ``limit`` (of steps).
     #[getter]
     fn status(&self) -> &'static str {
         self.refinement.status.name()
     }
 
-    /// Root mean square residual at the start and after every accepted step, in the output's unit
+    /// Root mean square residual at the start and after every accepted step, shape (steps + 1,), in the output's unit
     /// (outputs are balanced by their residuals where there are several).
     #[getter]
     fn history<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, &self.refinement.history)
     }
 
-    /// Every estimated parameter: ``name``, ``value``, ``std``.
+    /// Every estimated parameter, rows of ``name``, ``value`` and ``std``, both in the parameter's own unit.
     ///
     /// ``std`` is None where the data do not determine the parameter, and 0 for a weight at its bound.
     /// Weights and half-widths are numbered as in ``model.hysteresis[i].plays``, deadzones as in its
@@ -59,33 +67,37 @@ impl Refinement {
         self.refinement.parameters.iter().map(row).collect()
     }
 
-    /// Covariance of ``parameters``, shape (parameters, parameters).
+    /// Covariance of ``parameters``, (T5) in the theory, shape (parameters, parameters), each in the product of two units.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrix(py, &self.refinement.covariance)
     }
 
-    /// Combinations of parameters that the data do not determine: lists of (name, share).
+    /// Combinations of parameters that the data do not determine, largest share first.
+    ///
+    /// Lists of name and share, a pure number of either sign.
     #[getter]
     fn undetermined(&self) -> Vec<Vec<(String, f64)>> {
         self.refinement.undetermined.clone()
     }
 
-    /// Root mean square residual of each output on the training data, shape (outputs,).
+    /// Root mean square residual of each output on the training data, shape (outputs,), in its unit.
     #[getter]
     fn residual_rms<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, &self.refinement.residual_rms)
     }
 
-    /// Measured minus simulated output of each experiment, each (samples, outputs), with the starts that
-    /// were fitted.
+    /// Measured minus simulated output of each experiment, each (samples, outputs), in the outputs' units, with the
+    /// starts that were fitted.
     #[getter]
     fn residuals<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
         self.refinement.residuals.iter().map(|residual| from_matrix(py, residual)).collect()
     }
 
-    /// The noise of each output: ``rms`` (list), ``how`` (``repeated-periods``, ``rests`` or
-    /// ``high-frequency-residual``), and ``period`` or ``samples`` that it rests on.
+    /// The noise of each output, (T6) in the theory where the input repeats.
+    ///
+    /// ``rms`` (list, in the outputs' units), ``how`` (``repeated-periods``, ``rests`` or ``high-frequency-residual``), and
+    /// ``period`` (in samples) or ``samples`` that it rests on.
     #[getter]
     fn noise_floor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let floor = &self.refinement.noise_floor;
@@ -112,25 +124,45 @@ impl Refinement {
         self.refinement.robust
     }
 
-    /// Poles of G without its dead time's, and the standard deviations of their real parts (in the real
-    /// part) and imaginary parts.
+    /// Poles of G without its dead time's, and how far they may be off.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray of complex, each of shape (n,)
+    ///     The poles, and the standard deviations of their real parts (in the real part) and imaginary parts (in the
+    ///     imaginary part); no unit.
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let poles = self.refinement.poles().map_err(to_python)?;
         Ok((from_complex(py, poles.poles), from_complex(py, poles.deviations)))
     }
 
-    /// Standard deviations of the first Markov parameters of G, shape (outputs, inputs, count).
+    /// Standard deviations of the first Markov parameters of G.
+    ///
+    /// Parameters
+    /// ----------
+    /// count : int
+    ///     How many Markov parameters.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (outputs, inputs, count)
+    ///     In output units per unit of v.
     fn markov_std<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyAny>> {
         let deviations = self.refinement.markov_deviations(count).map_err(to_python)?;
         Ok(from_matrices(py, self.shape(), &deviations))
     }
 
-    /// Standard deviations of the frequency response at angles in rad per sample.
+    /// Standard deviations of the frequency response of G.
+    ///
+    /// Parameters
+    /// ----------
+    /// angles : array_like, shape (angles,)
+    ///     w in radians per sample: 2 pi f / rate.
     ///
     /// Returns
     /// -------
-    /// tuple of ndarray
-    ///     Of ln |G| (times 8.686 in dB) and of the phase in rad, each (angles, outputs, inputs).
+    /// tuple of ndarray, each of shape (angles, outputs, inputs)
+    ///     Of ``ln |G|`` (no unit; times 8.686 in dB), and of the phase in radians.
     fn response_std<'py>(
         &self,
         angles: &Bound<'py, PyAny>,
@@ -146,7 +178,17 @@ impl Refinement {
         Ok((stack(|at| &at.log_magnitude)?, stack(|at| &at.phase)?))
     }
 
-    /// Standard deviations of the intermediate signal that u leads to from rest, shaped like u.
+    /// Standard deviations of the intermediate signal v that u leads to from rest.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (samples,) or (samples, inputs)
+    ///     Input, in its unit.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shaped like u
+    ///     In the unit of v.
     fn loop_std<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (input, one_dimensional) = signal("u", u)?;
         let found = self.refinement.loop_deviations(&input).map_err(to_python)?;
@@ -154,6 +196,16 @@ impl Refinement {
     }
 
     /// Draws the residual over the steps; see ``gpi_hammerstein.plot.history``.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Axes to draw on; those of a new figure when left out.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///     The axes.
     #[pyo3(signature = (ax = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,
@@ -175,7 +227,7 @@ impl Refinement {
 
 /// Refines all parts of a model at once on a record.
 ///
-/// Levenberg-Marquardt on the simulation error, free run from the input alone, with respect to play and
+/// Levenberg-Marquardt on the simulation error, free run from the input alone, (T3) in the theory, with respect to play and
 /// deadzone weights, poles and zeros of G, the offset, and the start of experiments whose past is
 /// unknown. G keeps its DC gain and the half-widths the scale of the envelope. ``identify`` ends with it.
 ///
@@ -260,9 +312,10 @@ fn refine(
 /// Returns
 /// -------
 /// dict
-///     ``names``, ``values``, ``jacobians`` (one an experiment, each (outputs, samples, parameters), scored
-///     samples), ``gradient`` (half that of the sum of squares), ``hessian`` (J^T J), ``cost`` (sum of
-///     squares).
+///     ``names``; ``values``, shape (parameters,), each in its own unit; ``jacobians``, one an experiment, each
+///     (outputs, scored samples, parameters), in output units per unit of the parameter; ``gradient``, shape
+///     (parameters,), half that of ``cost``; ``hessian``, shape (parameters, parameters), J^T J; ``cost``, the
+///     sum of the squares of the residuals.
 ///
 /// Raises
 /// ------

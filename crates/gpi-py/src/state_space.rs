@@ -13,12 +13,12 @@ use numpy::IntoPyArray;
 use numpy::ndarray::Array3;
 use pyo3::prelude::*;
 
-/// Realizes Markov parameters as a stable state space (Ho-Kalman / ERA).
+/// Realizes Markov parameters as a stable state space (Ho-Kalman / ERA), (T1) in the theory.
 ///
 /// Parameters
 /// ----------
 /// markov : array_like, shape (taps,) or (outputs, inputs, taps)
-///     H_0, H_1, ...
+///     H_0, H_1, ..., in output units per input unit.
 /// order : int, optional
 ///     Number of states; chosen from the singular values when left out: where they fall by a factor
 ///     of 20 at once, or else where the rest holds less than 1e-4 of the sum of their squares.
@@ -69,13 +69,13 @@ fn realize(
 /// Parameters
 /// ----------
 /// A : array_like, shape (order, order)
-///     State matrix.
+///     State matrix, no unit.
 /// B : array_like, shape (order, inputs)
-///     Input matrix.
+///     Input matrix, in units of the state per input unit.
 /// C : array_like, shape (outputs, order)
-///     Output matrix.
+///     Output matrix, in output units per unit of the state.
 /// D : array_like, shape (outputs, inputs)
-///     Feed-through.
+///     Feed-through, in output units per input unit.
 ///
 /// Raises
 /// ------
@@ -123,9 +123,10 @@ impl StateSpace {
     /// Parameters
     /// ----------
     /// numerator : array_like, shape (n + 1,), or (outputs, inputs, n + 1)
-    ///     Coefficients, highest power first; a shorter vector is filled with zeros in front.
+    ///     Coefficients, highest power first, in output units per input unit; a shorter vector is filled with zeros in
+    ///     front.
     /// denominator : array_like, shape (n + 1,)
-    ///     Coefficients, highest power first.
+    ///     Coefficients, highest power first, no unit.
     ///
     /// Returns
     /// -------
@@ -158,28 +159,28 @@ impl StateSpace {
         Ok(tf.to_state_space().map_err(to_python)?.into())
     }
 
-    /// State matrix, shape (order, order).
+    /// State matrix, shape (order, order), no unit.
     #[getter]
     #[allow(non_snake_case)]
     fn A<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrix(py, self.system.a())
     }
 
-    /// Input matrix, shape (order, inputs).
+    /// Input matrix, shape (order, inputs), in units of the state per input unit.
     #[getter]
     #[allow(non_snake_case)]
     fn B<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrix(py, self.system.b())
     }
 
-    /// Output matrix, shape (outputs, order).
+    /// Output matrix, shape (outputs, order), in output units per unit of the state.
     #[getter]
     #[allow(non_snake_case)]
     fn C<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrix(py, self.system.c())
     }
 
-    /// Feed-through, shape (outputs, inputs).
+    /// Feed-through, shape (outputs, inputs), in output units per input unit.
     #[getter]
     #[allow(non_snake_case)]
     fn D<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
@@ -192,32 +193,32 @@ impl StateSpace {
         self.system.order()
     }
 
-    /// Eigenvalues of A, shape (order,).
+    /// Eigenvalues of A, shape (order,), no unit.
     #[getter]
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(from_complex(py, self.system.poles().map_err(to_python)?))
     }
 
-    /// Finite invariant zeros of a model with as many outputs as inputs.
+    /// Finite invariant zeros of a model with as many outputs as inputs, shape (n,), no unit.
     #[getter]
     fn zeros<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(from_complex(py, self.system.zeros().map_err(to_python)?))
     }
 
-    /// Largest modulus of a pole; below 1 the model is stable.
+    /// Largest modulus of a pole, no unit; below 1 the model is stable.
     #[getter]
     fn spectral_radius(&self) -> PyResult<f64> {
         self.system.spectral_radius().map_err(to_python)
     }
 
-    /// G(1), shape (outputs, inputs).
+    /// G(1), shape (outputs, inputs), in output units per input unit.
     #[getter]
     fn dc_gain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(from_matrix(py, &self.system.dc_gain().map_err(to_python)?))
     }
 
-    /// Singular values of ERA's Hankel matrix, descending, all or the leading ones (see ``era``); None for a
-    /// model from elsewhere.
+    /// Singular values of ERA's Hankel matrix, shape (n,), in output units per input unit, descending, all or the
+    /// leading ones (see ``era``); None for a model from elsewhere.
     #[getter]
     fn singular_values<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyAny>> {
         self.singular_values.as_ref().map(|values| from_vector(py, values))
@@ -229,7 +230,17 @@ impl StateSpace {
         self.reflected
     }
 
-    /// The output for u, shape (samples,) or (samples, inputs), from rest x(0) = 0.
+    /// The output for u, from rest x(0) = 0.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (samples,) or (samples, inputs)
+    ///     Input, in its unit.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (samples,) or (samples, outputs)
+    ///     y, in the outputs' units; a vector where u is one and there is one output.
     fn simulate<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         Ok(self.run(u, None)?.0)
     }
@@ -239,14 +250,15 @@ impl StateSpace {
     /// Parameters
     /// ----------
     /// u : array_like, shape (samples,) or (samples, inputs)
-    ///     Input.
+    ///     Input, in its unit.
     /// state : array_like, shape (order,), optional
-    ///     x(0); zeros when left out.
+    ///     x(0), in the states' own units; zeros when left out.
     ///
     /// Returns
     /// -------
     /// tuple of ndarray
-    ///     y, shaped like u, and the state, shape (order,).
+    ///     y, shape (samples,) or (samples, outputs), in the outputs' units, and the state, shape (order,), in the states'
+    ///     own units.
     #[pyo3(signature = (u, state = None))]
     fn run<'py>(
         &self,
@@ -263,12 +275,22 @@ impl StateSpace {
         Ok((from_signal(py, output, one_dimensional), from_vector(py, state.as_slice())))
     }
 
-    /// The first `count` Markov parameters, shape (outputs, inputs, count).
+    /// The first Markov parameters: H_0 = D, H_1 = C B, H_2 = C A B, ...
+    ///
+    /// Parameters
+    /// ----------
+    /// count : int
+    ///     How many.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (outputs, inputs, count)
+    ///     H_0, H_1, ..., in output units per input unit.
     fn markov<'py>(&self, py: Python<'py>, count: usize) -> Bound<'py, PyAny> {
         from_matrices(py, self.system.d().shape(), &self.system.markov(count))
     }
 
-    /// G(e^{jw}), shape (len(frequencies), outputs, inputs).
+    /// The frequency response G(e^{jw}).
     ///
     /// Parameters
     /// ----------
@@ -277,8 +299,8 @@ impl StateSpace {
     ///
     /// Returns
     /// -------
-    /// ndarray of complex
-    ///     The frequency response.
+    /// ndarray of complex, shape (count, outputs, inputs)
+    ///     G(e^{jw}), in output units per input unit.
     fn frequency_response<'py>(
         &self,
         frequencies: &Bound<'py, PyAny>,
@@ -294,8 +316,8 @@ impl StateSpace {
     /// Returns
     /// -------
     /// tuple of ndarray
-    ///     Numerator, shape (outputs, inputs, order + 1), and denominator, shape (order + 1,), highest
-    ///     power first.
+    ///     Numerator, shape (outputs, inputs, order + 1), in output units per input unit, and denominator,
+    ///     shape (order + 1,), no unit, both with the highest power first.
     fn to_transfer_function<'py>(
         &self,
         py: Python<'py>,
@@ -331,7 +353,7 @@ impl StateSpace {
     /// d : int, optional
     ///     Noncausal taps, the preview; chosen from the tolerance when left out.
     /// tolerance : float
-    ///     Largest truncation error where r or d is chosen.
+    ///     Largest truncation error where r or d is chosen, a fraction (``NoncausalFir.error``).
     ///
     /// Returns
     /// -------
@@ -357,6 +379,16 @@ impl StateSpace {
     }
 
     /// Draws the Bode plot; see ``gpi_hammerstein.plot.bode``.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Axes to draw on; those of a new figure when left out.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///     The axes.
     #[pyo3(signature = (ax = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,

@@ -24,7 +24,7 @@ from gpi_hammerstein.cli.validate import validate
 
 DONE, FAILED, WRONG_CALL, UNUSABLE_DATA, INTERRUPTED = 0, 1, 2, 3, 130
 
-app = typer.Typer(
+app: typer.Typer = typer.Typer(
     name="gpi",
     no_args_is_help=True,
     rich_markup_mode="rich",
@@ -60,8 +60,8 @@ EXAMPLES: dict[Callable[..., Any], str] = {
     compensate: "gpi compensate model/model.json path.csv --limits=-10,150 -o drive",
     export: "gpi export model/model.json --limits=-10,150 --c compensator",
 }
-for command, example in EXAMPLES.items():
-    app.command(epilog=f"Example: {example}")(command)
+for _command, _example in EXAMPLES.items():
+    app.command(epilog=f"Example: {_example}")(_command)
 app.add_typer(excite, name="excite")
 app.add_typer(datasets, name="datasets")
 app.add_typer(reproduce, name="reproduce")

@@ -10,7 +10,9 @@ from rich.table import Table
 from gpi_hammerstein import files
 from gpi_hammerstein.cli.output import console, print_json, working
 
-datasets = typer.Typer(no_args_is_help=True, help="Fetch measured records by their public address.")
+datasets: typer.Typer = typer.Typer(
+    no_args_is_help=True, help="Fetch measured records by their public address."
+)
 
 Name = Annotated[str, typer.Argument(help="A set; `gpi datasets list` names them.", show_default=False)]
 Part = Annotated[str | None, typer.Option(help="One of its parts; the first one unless given.")]

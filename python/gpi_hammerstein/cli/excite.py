@@ -15,7 +15,9 @@ from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import console, print_json
 from gpi_hammerstein.files import write_atomically
 
-excite = typer.Typer(no_args_is_help=True, help="Write an excitation signal: multisine, prbs or triangle.")
+excite: typer.Typer = typer.Typer(
+    no_args_is_help=True, help="Write an excitation signal: multisine, prbs or triangle."
+)
 
 Rate = Annotated[float, typer.Option(help="Sampling rate in Hz.", show_default=False)]
 Duration = Annotated[float, typer.Option(help="Length in s.", show_default=False)]

@@ -165,8 +165,6 @@ def summarise(screen: Console, result: dict[str, Any], unit: str, out: Path | No
     )
     for note in record["notes"]:
         screen.print(f"[yellow]note[/] {escape(note)}")
-    if result["interrupted"]:
-        screen.print("[yellow]note[/] stopped before the search had finished; this is what was found so far")
     screen.print(f"Held out: {escape(result['holdout'])}")
     screen.print(before_and_after(result, unit))
     for sentence in in_words(result, unit):

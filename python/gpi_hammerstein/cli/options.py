@@ -20,14 +20,16 @@ Records = Annotated[
 ]
 Input = Annotated[
     list[str] | None,
-    typer.Option("--input", "-u", help="Input columns; `u`, `u1` are found.", rich_help_panel=COLUMNS),
+    typer.Option(
+        "--input", "-u", help="Input columns; `u`, `u1`, `voltage` are found.", rich_help_panel=COLUMNS
+    ),
 ]
 Output = Annotated[
     list[str] | None,
     typer.Option(
         "--output",
         "-y",
-        help="Output columns; `y`, `y1`, `output` are found. For .npy records: .npy files of the outputs.",
+        help="Output columns; `y`, `y1`, `position` are found. For .npy records: .npy files of the outputs.",
         rich_help_panel=COLUMNS,
     ),
 ]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import Progress
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from gpi_hammerstein._native import GpiError, Record
@@ -84,7 +84,9 @@ def progress_bar() -> Iterator[Callable[[str, float], None] | None]:
     if not errors.is_terminal:
         yield None
         return
-    with Progress(console=errors, transient=True) as bar:
+    # stages come and go, and none knows how many follow: the time that has passed, not what is left
+    columns = (TextColumn("{task.description}"), SpinnerColumn(), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=errors, transient=True) as bar:
         task = bar.add_task("", total=1.0)
 
         def report(stage: str, done: float) -> None:

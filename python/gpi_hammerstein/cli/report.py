@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 from rich.markup import escape
 
+from gpi_hammerstein._native import ParameterError
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.explain import explained, split_effects
 from gpi_hammerstein.cli.output import common_unit, console, working
@@ -50,6 +51,10 @@ def report(
         "resample": resample,
         "warmup": warmup,
     }
+    if not out.parent.is_dir():
+        raise ParameterError(
+            f"`out` = {out}: cannot be written, there is no folder {out.parent}; make it first"
+        )
     chosen = split_effects(effects)
     recording, found, _ = explained(records, read, experiments, holdout_record, effects=chosen)
     with working("drawing"):

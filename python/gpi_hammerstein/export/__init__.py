@@ -58,7 +58,14 @@ def export_c(
 
     Examples
     --------
-    >>> export_c(model, "firmware/compensator", limits=(-10.0, 150.0))  # doctest: +SKIP
+    >>> import os, tempfile
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> folder = tempfile.mkdtemp()
+    >>> compensator = gpi.export_c(model, folder, limits=(0.0, 10.0))
+    >>> sorted(os.listdir(folder))
+    ['gpi_compensator.c', 'gpi_compensator.h']
     """
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
         raise ParameterError(f"`name` = {name}: letters, digits and `_`, such as x_axis")
@@ -107,7 +114,7 @@ def export_rust(
 
     Examples
     --------
-    >>> export_rust(model, "src/compensator.rs", precision="double")  # doctest: +SKIP
+    >>> gpi.export_rust(model, "src/compensator.rs", precision="double")  # doctest: +SKIP
     """
     compensator = model.compensator(limits=limits)
     real = "f32" if precision == "single" else "f64"

@@ -24,7 +24,11 @@ def compensation(found: Compensation, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> ax = gpi.plot.compensation(model.compensate(reference))  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> reference = 5.0 + np.sin(0.1 * np.arange(200))
+    >>> ax = gpi.plot.compensation(model.compensate(reference))
     """
     ax = axes(ax, 5.0, 5.0)
 

@@ -3,13 +3,14 @@
 from matplotlib.axes import Axes
 
 from gpi_hammerstein._native import Explanation
+from gpi_hammerstein.io import raise_warmup
 from gpi_hammerstein.plot.style import BLACK, ORANGE, VERMILION, axes, label
 
 
 def loops(
     found: Explanation, ax: Axes | None = None, *, experiment: int = 0, input: int = 0, output: int = 0
 ) -> Axes:
-    """Draw the measured output against the input, with both models' outputs.
+    """Draw the measured output against the input, with both models' outputs, where they are scored.
 
     Parameters
     ----------
@@ -27,15 +28,22 @@ def loops(
 
     Examples
     --------
-    >>> ax = gpi.plot.loops(found)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> found = gpi.explain(record, effects=[], delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.loops(found)
     """
     ax = axes(ax, 5.0, 5.0)
-    record = found.record
-    u, y = record.u[experiment][:, input], record.y[experiment][:, output]
-    before, after = found.residuals_before[experiment], found.residuals_after[experiment]
+    # Before the plays have forgotten an unknown past the models are somewhere else.
+    record = raise_warmup(found.record, found.warmups)
+    scored = slice(record.warmup[experiment], None)
+    u, y = record.u[experiment][scored, input], record.y[experiment][scored, output]
+    before, after = (
+        residuals[experiment][scored, output] for residuals in (found.residuals_before, found.residuals_after)
+    )
     ax.plot(u, y, color=BLACK, lw=0.9, label="measured")
-    ax.plot(u, y - before[:, output], color=ORANGE, lw=0.6, label="before")
-    ax.plot(u, y - after[:, output], color=VERMILION, lw=0.6, ls="--", label="after")
+    ax.plot(u, y - before, color=ORANGE, lw=0.6, label="before")
+    ax.plot(u, y - after, color=VERMILION, lw=0.6, ls="--", label="after")
     ax.set_xlabel(label(record.input_names[input], record.input_units[input]))
     ax.set_ylabel(label(record.output_names[output], record.output_units[output]))
     ax.set_title(title(found))

@@ -30,7 +30,8 @@ def markov(response: Fir | Model, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> ax = gpi.plot.markov(gpi.fir(u, y, taps=31))  # doctest: +SKIP
+    >>> u = np.random.default_rng(0).standard_normal(500)
+    >>> ax = gpi.plot.markov(gpi.fir(u, np.convolve(u, [0.0, 0.7, 0.3])[:500], taps=5))
     """
     ax = axes(ax)
     deviations = None
@@ -109,7 +110,7 @@ def bode(
 
     Examples
     --------
-    >>> ax = gpi.plot.bode(model.linear, model.rate, refinement=model.refinement)  # doctest: +SKIP
+    >>> ax = gpi.plot.bode(gpi.StateSpace([[0.5]], [[1.0]], [[0.5]], [[0.0]]), rate=1000.0)
     """
     ax = axes(ax)
     angles = np.geomspace(1e-3 * np.pi, np.pi, 1000)
@@ -159,7 +160,8 @@ def singular_values(sys: StateSpace, ax: Axes | None = None, *, values: ArrayLik
     ax
         Axes to draw on.
     values
-        Singular values to draw instead, such as those of a model's identification.
+        Singular values to draw instead, shape (n,), descending, such as those of a model's identification;
+        drawn as a ratio to the first one.
 
     Returns
     -------
@@ -168,7 +170,7 @@ def singular_values(sys: StateSpace, ax: Axes | None = None, *, values: ArrayLik
 
     Examples
     --------
-    >>> ax = gpi.plot.singular_values(gpi.era(fir.markov))  # doctest: +SKIP
+    >>> ax = gpi.plot.singular_values(gpi.era([0.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625]))
     """
     ax = axes(ax)
     own = sys.singular_values if values is None else values
@@ -201,6 +203,9 @@ def response(model: Model, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> ax = gpi.plot.response(model)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.response(model)
     """
     return bode(model.linear, model.rate, ax, refinement=model.refinement)

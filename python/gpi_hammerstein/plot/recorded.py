@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from gpi_hammerstein._native import Record
-from gpi_hammerstein.plot.style import BLACK, axes, label, line_style
+from gpi_hammerstein.plot.style import ABOVE_LEGEND, BLACK, axes, label, legend_above, line_style
 
 
 def record(record: Record, ax: Axes | None = None, *, experiment: int = 0) -> Axes:
@@ -27,7 +27,9 @@ def record(record: Record, ax: Axes | None = None, *, experiment: int = 0) -> Ax
 
     Examples
     --------
-    >>> ax = gpi.plot.record(record)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> ax = gpi.plot.record(record)
     """
     ax = axes(ax, 9.0, 4.0)
     u, y = record.u[experiment], record.y[experiment]
@@ -47,6 +49,6 @@ def record(record: Record, ax: Axes | None = None, *, experiment: int = 0) -> Ax
         ax.axvspan(0.0, (warmup - 1) / record.rate, color=BLACK, alpha=0.08, lw=0)
     ax.set_xlabel("time [s]")
     which = f", experiment {experiment}" if len(record.u) > 1 else ""
-    ax.set_title(f"Measured{which}")
-    ax.legend(lines, [str(line.get_label()) for line in lines], loc="upper right")
+    ax.set_title(f"Measured{which}", pad=ABOVE_LEGEND)
+    legend_above(ax, lines, [str(line.get_label()) for line in lines])
     return ax

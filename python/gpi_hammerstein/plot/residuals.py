@@ -15,7 +15,7 @@ from gpi_hammerstein.plot.style import BAND, BLACK, BLUE, ORANGE, axes, label
 Array = NDArray[np.float64]
 
 # One residual is blue; where there are two, the second is.
-COLOURS = {1: (BLUE,), 2: (ORANGE, BLUE)}
+COLOURS: dict[int, tuple[str, ...]] = {1: (BLUE,), 2: (ORANGE, BLUE)}
 
 
 @dataclass(frozen=True)
@@ -27,17 +27,21 @@ class Residuals:
     record
         What was measured.
     series
-        Names, and measured minus simulated output of each experiment, (samples, outputs).
+        Names, and measured minus simulated output of each experiment, shape (samples, outputs), in the
+        outputs' units.
     held_out
         Pairs of first and one past the last held-out sample, of each experiment.
     noise_rms
-        Noise of each output, in its unit, where it is known.
+        Noise of each output, shape (outputs,), in its unit, where it is known.
     title
         What is written above.
 
     Examples
     --------
-    >>> ax = gpi.plot.residual_spectrum(gpi.plot.Residuals.of_model(model, record))  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.residual_spectrum(gpi.plot.Residuals.of_model(model, record))
     """
 
     record: Record
@@ -61,6 +65,11 @@ class Residuals:
         fit_start, remove_mean
             As in :meth:`gpi_hammerstein.Model.error`.
 
+        Returns
+        -------
+        Residuals
+            One residual, nothing held out.
+
         Raises
         ------
         ParameterError, DataError
@@ -79,6 +88,11 @@ class Residuals:
         ----------
         found
             What `explain` returned.
+
+        Returns
+        -------
+        Residuals
+            Two residuals, with the noise floor.
         """
         series = {"before": found.residuals_before, "after": found.residuals_after}
         noise = np.asarray(found.noise_floor["rms"], dtype=np.float64)
@@ -92,6 +106,11 @@ class Residuals:
         ----------
         experiment, output
             Which one, counted from 0.
+
+        Returns
+        -------
+        list of tuple
+            Name, colour, and values, shape (samples,), in the output's unit.
         """
         colours = COLOURS[len(self.series)]
         return [
@@ -106,6 +125,11 @@ class Residuals:
         ----------
         experiment, output
             Which one, counted from 0.
+
+        Returns
+        -------
+        float
+            The largest value to each side of zero, in the output's unit.
         """
         scored = self.of(experiment, output)[0][2][self.record.warmup[experiment] :]
         return 2.5 * float(np.quantile(np.abs(scored), 0.98)) + 1e-300
@@ -117,6 +141,11 @@ class Residuals:
         ----------
         output
             Which one, counted from 0.
+
+        Returns
+        -------
+        str
+            The output's name, with its unit in brackets.
         """
         return label(f"residual of {self.record.output_names[output]}", self.record.output_units[output])
 
@@ -152,7 +181,10 @@ def residual_in_time(
 
     Examples
     --------
-    >>> ax = gpi.plot.residual_in_time(found)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> found = gpi.explain(record, effects=[], delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.residual_in_time(found)
     """
     ax = axes(ax, 9.0, 4.0)
     found = taken(found)
@@ -193,7 +225,10 @@ def residual_spectrum(
 
     Examples
     --------
-    >>> ax = gpi.plot.residual_spectrum(found)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> found = gpi.explain(record, effects=[], delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.residual_spectrum(found)
     """
     import scipy.signal
 
@@ -249,7 +284,10 @@ def residual_autocorrelation(
 
     Examples
     --------
-    >>> ax = gpi.plot.residual_autocorrelation(found)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> found = gpi.explain(record, effects=[], delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.residual_autocorrelation(found)
     """
     ax = axes(ax)
     found = taken(found)
@@ -266,7 +304,7 @@ def residual_autocorrelation(
     ax.axhspan(-bound, bound, color=BLACK, alpha=0.12, lw=0, label="95 % of white noise")
     ax.axhline(0.0, color=BLACK, lw=0.5)
     ax.set_xlabel("lag [samples]")
-    ax.set_ylabel(f"autocorrelation of the residual of {found.record.output_names[output]}")
+    ax.set_ylabel(f"autocorrelation of the residual of {found.record.output_names[output]} [-]")
     ax.set_title(found.title)
     ax.legend(loc="upper right")
     return ax

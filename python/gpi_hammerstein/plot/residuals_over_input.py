@@ -37,7 +37,10 @@ def residual_over_input(
 
     Examples
     --------
-    >>> ax = gpi.plot.residual_over_input(found)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> found = gpi.explain(record, effects=[], delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.residual_over_input(found)
     """
     found = taken(found)
     u = found.record.u[experiment][:, input]
@@ -72,7 +75,10 @@ def residual_over_speed(
 
     Examples
     --------
-    >>> ax = gpi.plot.residual_over_speed(found)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> found = gpi.explain(record, effects=[], delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.residual_over_speed(found)
     """
     found = taken(found)
     record = found.record

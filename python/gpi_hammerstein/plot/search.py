@@ -5,7 +5,16 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
 
 from gpi_hammerstein._native import Identification, Model, Refinement
-from gpi_hammerstein.plot.style import BLUE, GREEN, VERMILION, axes, label, say_nothing_to_draw
+from gpi_hammerstein.plot.style import (
+    ABOVE_LEGEND,
+    BLUE,
+    GREEN,
+    VERMILION,
+    axes,
+    label,
+    legend_above,
+    say_nothing_to_draw,
+)
 
 
 def candidates(found: Model | Identification, ax: Axes | None = None) -> Axes:
@@ -21,15 +30,18 @@ def candidates(found: Model | Identification, ax: Axes | None = None) -> Axes:
     Returns
     -------
     Axes
-        The criterion's axes; the numbers beside a structure are its order, plays, deadzones and delay.
+        The criterion's axes; the legend tells what was chosen.
 
     Examples
     --------
-    >>> ax = gpi.plot.candidates(model)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.candidates(model)
     """
     ax = axes(ax, 8.0, 4.5)
     ax.set(xlabel="parameters used [-]", ylabel="criterion above the best [-]")
-    ax.set_title("Structures compared", pad=26.0)
+    ax.set_title("Structures compared", pad=ABOVE_LEGEND)
     known = found.identification if isinstance(found, Model) else found
     rows = [] if known is None else known.candidates
     if not rows:
@@ -48,34 +60,17 @@ def candidates(found: Model | Identification, ax: Axes | None = None) -> Axes:
     ax.set_xlim(0.8 * float(used.min()), 1.4 * float(used.max()))
     right = ax.twinx()
     [squares] = right.plot(used, [row["rms"] for row in rows], "s", ms=5, mfc="none", color=VERMILION)
+    right.set_yscale("log")
     right.set_ylabel(label("residual rms", found.output_units[0] if isinstance(found, Model) else ""))
     [points] = ax.plot(used, above, "o", ms=5, color=BLUE)
     chosen = next(place for place, row in enumerate(rows) if row["chosen"])
     [ring] = ax.plot(used[chosen], above[chosen], "o", ms=12, mfc="none", mec=GREEN, mew=2)
-    level, last = 0, -np.inf
-    for place in np.argsort(used):
-        # The numbers of neighbours go above one another.
-        where = float(np.log(used[place]))
-        level = level + 1 if where - last < 0.15 * np.ptp(np.log(ax.get_xlim())) else 0
-        last = where
-        row = rows[place]
-        ax.annotate(
-            f"{row['order']}/{row['plays']}/{row['deadzones']}/{row['delay']}",
-            (used[place], above[place]),
-            xytext=(0, 9 + 11 * (level % 3)),
-            textcoords="offset points",
-            ha="center",
-            fontsize="small",
-        )
-    ax.legend(
-        [points, squares, ring],
-        ["criterion: order/plays/deadzones/delay", "rms (right)", "chosen"],
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=3,
-        frameon=False,
-        fontsize="small",
+    best = rows[chosen]
+    what = (
+        f"chosen: order {best['order']}, plays {best['plays']}, deadzones {best['deadzones']}, "
+        f"delay {best['delay']}"
     )
+    legend_above(ax, [points, squares, ring], ["criterion", "rms (right)", what])
     return ax
 
 
@@ -96,7 +91,10 @@ def history(found: Model | Refinement, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> ax = gpi.plot.history(model)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.history(model)
     """
     ax = axes(ax)
     refinement = found.refinement if isinstance(found, Model) else found

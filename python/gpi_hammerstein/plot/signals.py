@@ -5,7 +5,16 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
 
 from gpi_hammerstein._native import Model, Record
-from gpi_hammerstein.plot.style import BLACK, BLUE, VERMILION, axes, label, shade_path
+from gpi_hammerstein.plot.style import (
+    ABOVE_LEGEND,
+    BLACK,
+    BLUE,
+    VERMILION,
+    axes,
+    label,
+    legend_above,
+    shade_path,
+)
 
 Array = NDArray[np.float64]
 
@@ -16,9 +25,9 @@ def loop(u: ArrayLike, v: ArrayLike, model: Model | None = None, ax: Axes | None
     Parameters
     ----------
     u
-        Input, (samples,).
+        Input, shape (samples,), in the input's unit.
     v
-        Intermediate signal or output, (samples,).
+        Intermediate signal or output, shape (samples,), in the output's unit.
     model
         A model of one input; its own loop is drawn on top, with its band where the model knows how sure
         it is, and its units label the axes.
@@ -37,7 +46,8 @@ def loop(u: ArrayLike, v: ArrayLike, model: Model | None = None, ax: Axes | None
 
     Examples
     --------
-    >>> ax = gpi.plot.loop(u, model.intermediate(u))  # doctest: +SKIP
+    >>> u = np.sin(0.1 * np.arange(200))
+    >>> ax = gpi.plot.loop(u, gpi.PlayBank([0.0, 0.5], [1.0, 0.5])(u))
     """
     ax = axes(ax, 5.0, 5.0)
     x = np.asarray(u, dtype=np.float64).reshape(-1)
@@ -107,7 +117,10 @@ def fit(
 
     Examples
     --------
-    >>> ax = gpi.plot.fit(model, record)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.fit(model, record)
     """
     ax = axes(ax, 9.0, 4.0)
     measured = record.y[experiment][:, output]
@@ -116,10 +129,14 @@ def fit(
     ax.plot(t, measured, color=BLUE, lw=1.0, label="measured")
     ax.plot(t, simulated, color=VERMILION, lw=0.9, ls="--", label="simulated")
     _shade_warmup(ax, record, experiment)
-    ax.legend(loc="upper right")
+    warmup, samples = record.warmup[experiment], len(measured)
+    if 2 * warmup > samples:
+        # A record that was split off carries all that came before it.
+        ax.set_xlim((warmup - 0.1 * (samples - warmup)) / record.rate, samples / record.rate)
+    legend_above(ax, *ax.get_legend_handles_labels())
     ax.set_xlabel("time [s]")
     ax.set_ylabel(label(record.output_names[output], record.output_units[output]))
-    ax.set_title("Simulation from the input alone")
+    ax.set_title("Simulation from the input alone", pad=ABOVE_LEGEND)
     return ax
 
 
@@ -159,7 +176,10 @@ def residual(
 
     Examples
     --------
-    >>> ax = gpi.plot.residual(model, record)  # doctest: +SKIP
+    >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+    >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+    >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+    >>> ax = gpi.plot.residual(model, record)
     """
     ax = axes(ax, 9.0, 3.0)
     values = model.residual(record, fit_start=fit_start)[experiment][:, output]

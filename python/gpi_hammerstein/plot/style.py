@@ -1,7 +1,10 @@
 """Colours, labels and bands that all pictures share."""
 
+from collections.abc import Sequence
+
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
@@ -11,6 +14,9 @@ BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 PURPLE, SKY, BLACK = "#CC79A7", "#56B4E9", "#000000"
 CYCLE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
 STYLES = ("-", "--", ":", "-.")
+
+# Points between the axes and a title that stands above a legend.
+ABOVE_LEGEND = 26.0
 
 # Standard deviations to each side that hold 95 % of a normal distribution.
 BAND = 1.96
@@ -33,6 +39,19 @@ def label(name: str, unit: str) -> str:
 def line_style(index: int) -> tuple[str, str]:
     """Return colour and dashes of one line among many."""
     return CYCLE[index % len(CYCLE)], STYLES[index // len(CYCLE) % len(STYLES)]
+
+
+def legend_above(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    """Put the legend between title and axes, where it hides nothing; call it before the title is set."""
+    ax.legend(
+        handles,
+        labels,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=len(labels),
+        frameon=False,
+        fontsize="small",
+    )
 
 
 def say_nothing_to_draw(ax: Axes, why: str) -> None:

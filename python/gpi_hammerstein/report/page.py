@@ -19,7 +19,7 @@ VERDICTS = {
     "unattributed": "Unattributed: no effect of the catalogue explains what is left.",
 }
 # Which pictures belong to which part of the page, by the beginning of their keys.
-PARTS = {
+PARTS: dict[str, tuple[str, ...]] = {
     "loop": ("loop",),
     "residual": ("time", "spectrum", "input", "speed", "autocorrelation"),
     "linear": ("bode", "markov", "singular-values"),

@@ -3,6 +3,8 @@
 use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
 
 /// `u_s(k) = u_s(k-1) + clamp(u(k) - u_s(k-1), -s Ts, s Ts)`: the drive cannot change faster than s.
+///
+/// (E2) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AmplifierSlew {
     /// The input that the amplifier drives.

@@ -4,6 +4,8 @@ use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units};
 use crate::operators::play;
 
 /// `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`: the output follows only when the gap is closed.
+///
+/// (E10) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Backlash {
     /// The output behind the gap.

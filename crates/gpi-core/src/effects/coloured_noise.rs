@@ -3,6 +3,8 @@
 use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
 /// `e(k) = sum_i a_i e(k-i) + w(k)`, w white: what is left remembers itself, and nothing else.
+///
+/// (E15) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ColouredNoise {
     /// The output whose noise it is.

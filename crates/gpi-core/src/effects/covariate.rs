@@ -5,6 +5,8 @@ use crate::Record;
 
 /// `y += g L x`: a measured column x (a temperature, a neighbouring axis) leaks in, at once or through a
 /// first-order lag L of unit gain and time constant T. A column that only repeats an input is none.
+///
+/// (E13) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Covariate {
     /// The output that it adds to.

@@ -4,6 +4,8 @@ use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
 /// `y += sum_i c_i L_i v` with first-order lags L_i of unit gain and time constants T_i: after a step the
 /// output goes on by c_i within a few T_i.
+///
+/// (E6) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Creep {
     /// The input whose v drives it.

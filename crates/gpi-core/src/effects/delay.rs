@@ -3,6 +3,8 @@
 use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
 
 /// `u_d(t) = u(t - T)`: the drive arrives T later; between samples u is a straight line.
+///
+/// (E1) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Delay {
     /// The input that arrives late.

@@ -4,6 +4,8 @@ use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units,
 
 /// `y += d(t)`, d a slow function of time: a smooth curve through evenly spaced knots, the first of which
 /// is 0 (the offset at the start is the model's).
+///
+/// (E11) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Drift {
     /// The output that drifts.

@@ -4,6 +4,8 @@ use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units, 
 
 /// `y = x (1 + g(t))`, g a slow function of time: a smooth curve through evenly spaced knots, the first
 /// of which is 0 (the gain at the start is the model's).
+///
+/// (E9) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GainDrift {
     /// The output whose sensitivity changes.

@@ -9,6 +9,8 @@ use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 ///
 /// Sums of curves of plays are the Preisach operators (1 + dq/df is their density over the half-plane of
 /// thresholds), whose minor loops change with their place. The declared hysteresis is q = 0.
+///
+/// (E4) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HysteresisShape {
     /// The input whose hysteresis it is.

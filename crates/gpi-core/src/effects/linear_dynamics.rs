@@ -4,6 +4,8 @@ use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
 /// `(b1 q^-1 + b2 q^-2) / (1 + a1 q^-1 + a2 q^-2)` from v to y, beside G: one more mode, or two real
 /// poles.
+///
+/// (E5) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LinearDynamics {
     /// The input whose v drives it.

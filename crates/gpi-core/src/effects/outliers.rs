@@ -4,6 +4,8 @@ use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
 /// Samples that stand apart from their neighbours by far more than the noise; the fit counts them by
 /// Huber's loss.
+///
+/// (E14) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outliers {
     /// How many there are.

@@ -3,6 +3,8 @@
 use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units};
 
 /// `y = x + s sum_m c_m ((x - m) / s)^m`, m = 2 ..: a static curve after G, its slope carried by the plays.
+///
+/// (E8) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OutputNonlinearity {
     /// The output that is read through the curve.

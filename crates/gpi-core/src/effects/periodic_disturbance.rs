@@ -4,6 +4,8 @@ use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units}
 use crate::spectrum::{Strongest, near, peak, power};
 
 /// `y += a cos(2 pi f t) + b sin(2 pi f t)`: mains hum, a pump, a vibration.
+///
+/// (E12) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PeriodicDisturbance {
     /// The output that it adds to.

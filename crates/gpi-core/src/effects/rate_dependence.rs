@@ -7,6 +7,8 @@ use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
 ///
 /// `g(s) = s`, or with a [`SpeedLaw`] `g(s) = s_0 ((1 + s / s_0)^e - 1) / e`, which starts as s and then
 /// grows slower.
+///
+/// (E3) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RateDependence {
     /// The input whose hysteresis it is.

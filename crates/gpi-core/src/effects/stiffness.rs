@@ -9,6 +9,8 @@ use super::{Block, Candidate, InnerLoop, Law, Quantity, Sees, Situation, Stage, 
 /// Powers of the displacement make Duffing's oscillator (a cube) or directions that differ (a square); stops
 /// make hysteresis inside the loop, which softens the mechanics and damps them as the amplitude grows. Around
 /// several outputs z mixes the states: of the displacements first, then of what drives them.
+///
+/// (E7) in the documentation's theory.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Stiffness {
     /// At least one.

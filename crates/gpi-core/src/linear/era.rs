@@ -32,7 +32,8 @@ pub struct Era {
 ///
 /// With the singular value decomposition `U S V^T` of the block Hankel matrix `[H_{i+j+1}]` and the
 /// shifted one `[H_{i+j+2}]`: `A = S^-1/2 U^T [H_{i+j+2}] V S^-1/2`, `B = S^1/2 V^T E_1`,
-/// `C = E_1^T U S^1/2`, `D = H_0` (Ho and Kalman 1966; Juang 1994, chapter 5).
+/// `C = E_1^T U S^1/2`, `D = H_0` (Ho and Kalman 1966; Juang 1994, chapter 5), (T1) in the
+/// documentation's theory.
 ///
 /// A given order is kept. Otherwise the order is where the singular values fall by a factor of 20 at
 /// once, or else where the rest holds less than 1e-4 of the sum of their squares.

@@ -36,7 +36,7 @@ pub struct NoncausalFir {
     /// d: how many samples of the future the inverse looks at.
     pub noncausal: usize,
     /// What was cut off: the sum of the norms of the taps left out, as a fraction of the sum over
-    /// all taps. It bounds the relative error of the frequency response.
+    /// all taps. It bounds the relative error of the frequency response, (T2) in the documentation's theory.
     pub error: f64,
 }
 

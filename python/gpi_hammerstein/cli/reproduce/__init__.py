@@ -5,7 +5,7 @@ import typer
 from gpi_hammerstein.cli.reproduce.paper import paper_command
 from gpi_hammerstein.cli.reproduce.steering_mirror import steering_mirror_command
 
-reproduce = typer.Typer(no_args_is_help=True, help="Run published examples again.")
+reproduce: typer.Typer = typer.Typer(no_args_is_help=True, help="Run published examples again.")
 
 
 @reproduce.callback()
