@@ -150,6 +150,47 @@ def test_the_search_can_be_stopped_and_keeps_what_it_found():
     assert next(iter(in_words(found.to_dict()))).startswith("Stopped before the search had finished")
 
 
+def test_wrong_samples_are_told_however_few(tmp_path):
+    plant = plants.draw(3, (), None, SECONDS, RATE)
+    run = plant.record(0)
+    y = np.array(run.y, dtype=float).reshape(-1)
+    span = np.ptp(y)
+    y[5000] += 0.3 * span
+    y[7200] -= 0.2 * span
+    found = gpi.explain(gpi.Record(run.u, y, rate=run.rate), order=3, effects=[])
+    assert [row["row"] for row in found.wrong_samples] == [5000, 7200]
+    assert found.wrong_samples[0] | {"row": 0} == {"experiment": 0, "output": "y", "row": 0}
+    words = " ".join(in_words(found.to_dict()))
+    assert "2 samples stand apart from their neighbours" in words and "row 5000 of y and row 7200" in words
+
+
+def bouc_wen(u, rate):
+    """0.5 u + 0.5 z before a mode at 170 Hz, z' = 0.9 u' - 0.05 |u'| z - 0.02 u' |z|."""
+    steps, z, v = 4, 0.0, np.empty_like(u)
+    for k, du in enumerate(np.diff(u, prepend=u[0]) / steps):
+        for _ in range(steps):
+            z += 0.9 * du - 0.05 * abs(du) * z - 0.02 * du * abs(z)
+        v[k] = 0.5 * (u[k] + z)
+    omega = 2 * np.pi * 170.0
+    mode = scipy.signal.bilinear([omega**2], [1.0, 0.04 * omega, omega**2], rate)
+    return scipy.signal.lfilter(*mode, v - v[0]) + v[0]
+
+
+def test_a_mode_is_kept_where_slow_poles_are_not():
+    """Its memory of the path looks like slow poles; without them a lower order would drop the mode first."""
+    rate, t = 2000.0, np.arange(20_000) / 2000.0
+    random = np.random.default_rng(5)
+    lines = np.array([0.5, 1.3, 3.1, 7.7, 19.1, 41.3, 97.7, 151.1, 203.3])
+    phases = random.uniform(0, 2 * np.pi, len(lines))
+    u = (np.sin(2 * np.pi * np.outer(t, lines) + phases) / np.maximum(1.0, lines / 10)).sum(axis=1)
+    u = 60 * (u - u.min()) / np.ptp(u)
+    y = bouc_wen(u, rate) + 0.01 * random.standard_normal(len(u))
+    found = gpi.explain(gpi.Record(u, y, rate=rate), effects=[])
+    angles = np.angle(found.base.linear.poles) * rate / (2 * np.pi)
+    assert np.abs(angles - 166.0).min() < 3.0
+    assert found.before["train"]["rms"] < 0.5  # 1.64 where the mode is dropped
+
+
 def test_an_interrupt_before_anything_is_known_is_raised():
     plant = plants.draw(1, (), None, SECONDS, RATE)
 

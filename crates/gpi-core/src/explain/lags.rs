@@ -1,14 +1,11 @@
 //! Creep that hides in G: slow poles that came when something else was fitted.
 
 use super::search::Search;
-use crate::effects::longest_lag;
+use crate::Error;
 use crate::identify::Progress;
 use crate::identify::levenberg_marquardt::fit;
+use crate::identify::memory::Memory;
 use crate::identify::point::Point;
-use crate::identify::preparation::rescale;
-use crate::linear::Sections;
-use crate::{Error, Record};
-use nalgebra::DVector;
 
 /// What a search had before lags were taken out of its G.
 pub(super) struct Before {
@@ -26,7 +23,8 @@ impl Search<'_> {
         if !may_creep || self.order_is_given || self.before.is_some() {
             return Ok(false);
         }
-        let Some(point) = without_lags(&self.point, &self.prepared.record)? else {
+        let memory = Memory::of(&self.prepared.record);
+        let Some(point) = self.point.without(|pole| memory.is_slow_lag(pole))? else {
             return Ok(false);
         };
         let fitted = fit(point, &self.prepared.record, &self.options, "slow poles", progress)?;
@@ -50,35 +48,4 @@ impl Search<'_> {
         }
         Ok(())
     }
-}
-
-/// The point without the slow lags of G; `None` where it has none, or nothing else.
-fn without_lags(point: &Point, record: &Record) -> Result<Option<Point>, Error> {
-    let longest = longest_lag(record.rate());
-    let slow = |pole: &nalgebra::Complex<f64>| {
-        pole.im == 0.0 && pole.re > 0.0 && -1.0 / pole.re.ln() > longest
-    };
-    let own = point.dynamics.own();
-    // what acts back drives the states of G as they are
-    if !own.poles().iter().any(slow) || point.loops().next().is_some() {
-        return Ok(None);
-    }
-    let mut sections = Sections::from_delayed_state_space(&own.to_state_space()?)?;
-    sections.sections.retain(|section| !section.poles().iter().all(slow));
-    if sections.sections.is_empty() || sections.poles().iter().any(slow) {
-        return Ok(None);
-    }
-    let order = sections.order();
-    let beside = point.dynamics.sections.iter().filter(|section| section.beside.is_some());
-    sections.sections.extend(beside.cloned());
-    let mut faster = point.clone();
-    for past in &mut faster.pasts {
-        let kept = past.state.len() - own.order();
-        let states = past.state.rows(own.order(), kept).into_owned();
-        past.state = DVector::zeros(order + kept);
-        past.state.rows_mut(order, kept).copy_from(&states);
-    }
-    faster.dynamics = sections;
-    rescale(&mut faster);
-    Ok(Some(faster))
 }

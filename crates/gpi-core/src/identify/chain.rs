@@ -123,6 +123,8 @@ pub(crate) fn compare(
         for point in &points {
             search.climb(point, progress)?;
         }
+    } else if options.order.is_none() {
+        search.shed(progress)?;
     }
     let stages = (Some(seed.fir), seed.singular_values, seed.reflected, seed.rounds);
     compared(search, false, stages, supported)

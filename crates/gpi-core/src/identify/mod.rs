@@ -10,6 +10,7 @@
 
 mod adjoint;
 mod bands;
+mod bridge;
 pub(crate) mod chain;
 pub(crate) mod colour;
 mod dynamic;
@@ -26,6 +27,7 @@ pub(crate) mod levenberg_marquardt;
 pub(crate) mod linearization;
 #[cfg(test)]
 pub(crate) mod looped;
+pub(crate) mod memory;
 mod motion;
 mod names;
 pub(crate) mod noise_floor;

@@ -346,6 +346,7 @@ impl Refined {
         let record = &prepared.record;
         let values = prepared.values();
         let status = self.fitted.status;
+        self.bridge(prepared, progress)?;
         self.drop_unused(prepared, progress)?;
         let uncertainty = self.uncertainty(record, progress)?;
         let Fitted { point, linearization, history, .. } = self.fitted;

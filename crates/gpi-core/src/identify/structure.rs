@@ -2,6 +2,7 @@
 
 use super::identification::IdentifyOptions;
 use super::levenberg_marquardt::fit;
+use super::memory::Memory;
 use super::point::{DynamicsFreedom, Point, range};
 use super::preparation::{Prepared, rescale};
 use super::refine::{RefineOptions, Refined, joint, settings};
@@ -209,9 +210,7 @@ impl<'a> Search<'a> {
     /// Works the criteria out, with the colour of the residual that is smallest.
     fn compare(&mut self) {
         let values = self.prepared.values();
-        let smallest = (0..self.candidates.len())
-            .min_by(|&i, &j| self.candidates[i].rms.total_cmp(&self.candidates[j].rms));
-        let colour = smallest.map_or(1.0, |place| self.refined[place].1);
+        let colour = self.closest().map_or(1.0, |place| self.refined[place].1);
         let usable: Vec<bool> = self.refined.iter().map(|(r, _)| self.is_usable(r)).collect();
         for (candidate, usable) in self.candidates.iter_mut().zip(usable) {
             let deviance = 2.0 * values * candidate.rms.max(f64::MIN_POSITIVE).ln();
@@ -229,9 +228,7 @@ impl<'a> Search<'a> {
         if self.refined.iter().any(|(refined, _)| self.is_usable(refined)) {
             return false;
         }
-        let smallest =
-            |&i: &usize, &j: &usize| self.candidates[i].rms.total_cmp(&self.candidates[j].rms);
-        let Some(best) = (0..self.candidates.len()).min_by(smallest) else { return false };
+        let Some(best) = self.closest() else { return false };
         let dynamics = &self.refined[best].0.fitted.point.dynamics;
         // twice the corner of the longest lag that is dynamics
         let lowest = (2.0 / longest_lag(self.prepared.record.rate())).min(1.0);
@@ -242,21 +239,28 @@ impl<'a> Search<'a> {
         high < FLAT * low
     }
 
-    fn is_usable(&self, refined: &Refined) -> bool {
-        /// Of the record's length.
-        const LONGEST_MEMORY: f64 = 0.05;
-        if !self.fast {
-            return true;
+    /// Tries the best fit of all without the poles that rule it out: a lower order drops the weakest mode
+    /// instead, which may be the stage's own resonance.
+    pub(crate) fn shed(&mut self, progress: Progress) -> Result<(), Error> {
+        let Some(place) = self.closest().filter(|_| self.fast) else { return Ok(()) };
+        let memory = Memory::of(&self.prepared.record);
+        let point = &self.refined[place].0.fitted.point;
+        if let Some(point) = point.without(|pole| memory.is_exceeded_by(pole))? {
+            self.offer(point, progress)?;
         }
-        let record = &self.prepared.record;
-        let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
-        let swings = LONGEST_MEMORY * longest as f64;
-        let lags = swings.min(longest_lag(record.rate()));
-        refined.fitted.point.dynamics.poles().iter().all(|pole| {
-            let memory = -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln();
-            let is_lag = pole.im == 0.0 && pole.re > 0.0;
-            memory < if is_lag { lags } else { swings }
-        })
+        Ok(())
+    }
+
+    fn is_usable(&self, refined: &Refined) -> bool {
+        let memory = Memory::of(&self.prepared.record);
+        let poles = refined.fitted.point.dynamics.poles();
+        !self.fast || !poles.iter().any(|pole| memory.is_exceeded_by(pole))
+    }
+
+    /// The place of the candidate with the least residual, usable or not.
+    fn closest(&self) -> Option<usize> {
+        let rms = |i: usize| self.candidates[i].rms;
+        (0..self.candidates.len()).min_by(|&i, &j| rms(i).total_cmp(&rms(j)))
     }
 
     /// The place of the candidate with the least criterion.

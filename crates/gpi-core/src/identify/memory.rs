@@ -1,0 +1,67 @@
+//! How long G may remember, where what is slower has a name of its own.
+
+use super::point::Point;
+use super::preparation::rescale;
+use crate::effects::longest_lag;
+use crate::linear::Sections;
+use crate::{Error, Record};
+use nalgebra::{Complex, DVector};
+
+/// The longest memory of a mechanical stage's dynamics, in samples.
+pub(crate) struct Memory {
+    lag: f64,
+    swing: f64,
+}
+
+impl Memory {
+    pub(crate) fn of(record: &Record) -> Self {
+        /// Of the longest experiment.
+        const PART: f64 = 0.05;
+        let samples = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
+        let swing = PART * samples as f64;
+        Self { lag: longest_lag(record.rate()), swing }
+    }
+
+    /// Whether a pole follows creep.
+    pub(crate) fn is_slow_lag(&self, pole: &Complex<f64>) -> bool {
+        pole.im == 0.0 && pole.re > 0.0 && -1.0 / pole.re.ln() > self.lag
+    }
+
+    /// Whether a pole follows creep or a disturbance.
+    pub(crate) fn is_exceeded_by(&self, pole: &Complex<f64>) -> bool {
+        let memory = -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln();
+        memory >= self.swing || self.is_slow_lag(pole)
+    }
+}
+
+impl Point {
+    /// The same without poles of G; `None` where it has no such poles, or none else.
+    pub(crate) fn without(
+        &self,
+        unwanted: impl Fn(&Complex<f64>) -> bool,
+    ) -> Result<Option<Self>, Error> {
+        let own = self.dynamics.own();
+        // what acts back drives the states of G as they are
+        if !own.poles().iter().any(&unwanted) || self.loops().next().is_some() {
+            return Ok(None);
+        }
+        let mut sections = Sections::from_delayed_state_space(&own.to_state_space()?)?;
+        sections.sections.retain(|section| !section.poles().iter().all(&unwanted));
+        if sections.sections.is_empty() || sections.poles().iter().any(unwanted) {
+            return Ok(None);
+        }
+        let order = sections.order();
+        let beside = self.dynamics.sections.iter().filter(|section| section.beside.is_some());
+        sections.sections.extend(beside.cloned());
+        let mut point = self.clone();
+        for past in &mut point.pasts {
+            let kept = past.state.len() - own.order();
+            let states = past.state.rows(own.order(), kept).into_owned();
+            past.state = DVector::zeros(order + kept);
+            past.state.rows_mut(order, kept).copy_from(&states);
+        }
+        point.dynamics = sections;
+        rescale(&mut point);
+        Ok(Some(point))
+    }
+}
