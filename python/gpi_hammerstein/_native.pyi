@@ -48,6 +48,7 @@ __all__ = [
     "multisine",
     "prbs",
     "decaying_triangle",
+    "held_steps",
 ]
 
 __version__: str
@@ -441,6 +442,8 @@ class Explanation:
     @property
     def tests(self) -> list[dict[str, Any]]: ...
     @property
+    def wrong_samples(self) -> list[dict[str, Any]]: ...
+    @property
     def noise_floor(self) -> dict[str, Any]: ...
     @property
     def next_experiment(self) -> dict[str, str] | None: ...
@@ -548,4 +551,7 @@ def prbs(
 ) -> _Array: ...
 def decaying_triangle(
     samples: int, rate: float, frequency: float, range: tuple[float, float], *, slew: float | None = None
+) -> _Array: ...
+def held_steps(
+    samples: int, rate: float, range: tuple[float, float], *, slew: float | None = None
 ) -> _Array: ...

@@ -152,6 +152,7 @@ def test_validate_prints_and_writes_what_the_contract_says(
         (["multisine", "--band", "1", "100", "--detection"], "multisine"),
         (["prbs", "--clock", "100"], "prbs"),
         (["triangle", "--frequency", "2", "--slew", "100"], "triangle"),
+        (["steps", "--slew", "100"], "steps"),
     ],
 )
 def test_excite_keeps_to_rate_range_and_slew(

@@ -1,4 +1,4 @@
-//! Input signals that show what an actuator does: multisine, binary noise, decaying triangle.
+//! Input signals that show what an actuator does: multisine, binary noise, decaying triangle, held steps.
 //!
 //! Every generator returns one value per sample within `range`, in the unit of the drive, and limits
 //! the slope to `slew` units per second when one is given.
@@ -206,6 +206,27 @@ pub fn decaying_triangle(drive: &Drive, frequency: f64) -> Result<Vec<f64>, Erro
     Ok(signal)
 }
 
+/// A quarter of the time each at the low end of the range, the high end, the middle and the low end again.
+///
+/// What goes on while the input stands still is slow: creep follows each step, a drift does not, and a
+/// drifting gain shows only away from zero.
+///
+/// # Errors
+/// A parameter out of its range, fewer than four samples.
+pub fn held_steps(drive: &Drive) -> Result<Vec<f64>, Error> {
+    drive.validate()?;
+    if drive.samples < 4 {
+        return Err(Error::parameter("samples", drive.samples, "at least one for each level, 4"));
+    }
+    let (low, high) = drive.range;
+    let levels = [low, high, f64::midpoint(low, high), low];
+    let mut signal: Vec<f64> = (0..drive.samples).map(|k| levels[4 * k / drive.samples]).collect();
+    if let Some(slew) = drive.slew {
+        limit_slope(&mut signal, slew / drive.rate);
+    }
+    Ok(signal)
+}
+
 /// Reproducible random numbers (SplitMix64), the same on every platform.
 struct Noise(u64);
 
@@ -285,12 +306,22 @@ mod tests {
     }
 
     #[test]
+    fn steps_hold_each_level_as_long() {
+        let signal = held_steps(&DRIVE).unwrap();
+        let levels: Vec<f64> = signal.chunks(500).map(|chunk| chunk[0]).collect();
+        assert_eq!(levels, [-1.0, 3.0, 1.0, -1.0]);
+        assert!(signal.chunks(500).all(|chunk| chunk.iter().all(|value| *value == chunk[0])));
+        assert!(held_steps(&Drive { samples: 3, ..DRIVE }).is_err());
+    }
+
+    #[test]
     fn the_slope_limit_holds() {
         let drive = Drive { slew: Some(50.0), ..DRIVE };
         for signal in [
             multisine(&drive, (1.0, 200.0), Lines::All, 1).unwrap(),
             prbs(&drive, 100.0, 1).unwrap(),
             decaying_triangle(&drive, 20.0).unwrap(),
+            held_steps(&drive).unwrap(),
         ] {
             assert!(signal.windows(2).all(|w| (w[1] - w[0]).abs() <= 0.05 + 1e-12));
         }

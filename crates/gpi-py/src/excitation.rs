@@ -159,8 +159,53 @@ fn decaying_triangle(
     Ok(from_vector(py, &signal))
 }
 
+/// A quarter of the time each at the low end of the range, the high end, the middle and the low end again.
+///
+/// What goes on while the input stands still is slow: creep follows each step, a drift does not, and a drifting
+/// gain shows only away from zero.
+///
+/// Parameters
+/// ----------
+/// samples : int
+///     Number of samples.
+/// rate : float
+///     Sampling rate in Hz.
+/// range : tuple of float
+///     Smallest and largest value, in the drive's unit.
+/// slew : float, optional
+///     Largest slope in units per second.
+///
+/// Returns
+/// -------
+/// ndarray, shape (samples,)
+///     The drive signal, in the drive's unit.
+///
+/// Raises
+/// ------
+/// ParameterError
+///     A parameter out of its range, fewer than four samples.
+///
+/// Examples
+/// --------
+/// >>> import gpi_hammerstein as gpi
+/// >>> gpi.held_steps(8, 1.0, (0.0, 10.0)).tolist()
+/// [0.0, 0.0, 10.0, 10.0, 5.0, 5.0, 0.0, 0.0]
+#[pyfunction]
+#[pyo3(signature = (samples, rate, range, *, slew = None))]
+fn held_steps(
+    py: Python<'_>,
+    samples: usize,
+    rate: f64,
+    range: (f64, f64),
+    slew: Option<f64>,
+) -> PyResult<Bound<'_, PyAny>> {
+    let drive = Drive { samples, rate, range, slew };
+    Ok(from_vector(py, &excitation::held_steps(&drive).map_err(to_python)?))
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(multisine, module)?)?;
     module.add_function(wrap_pyfunction!(prbs, module)?)?;
-    module.add_function(wrap_pyfunction!(decaying_triangle, module)?)
+    module.add_function(wrap_pyfunction!(decaying_triangle, module)?)?;
+    module.add_function(wrap_pyfunction!(held_steps, module)?)
 }

@@ -181,6 +181,26 @@ impl Explanation {
         test_rows(py, &self.found.tests, &self.found.model)
     }
 
+    /// Isolated samples that stand apart from their neighbours and are not scored.
+    ///
+    /// Rows of ``experiment`` and ``row``, pure numbers counted from 0, and ``output``, its name.
+    #[getter]
+    fn wrong_samples<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let mut rows = Vec::new();
+        for (experiment, outputs) in self.found.wrong_samples.iter().enumerate() {
+            for (output, places) in self.found.model.outputs().iter().zip(outputs) {
+                for place in places {
+                    let row = PyDict::new(py);
+                    row.set_item("experiment", experiment)?;
+                    row.set_item("output", &output.name)?;
+                    row.set_item("row", place)?;
+                    rows.push(row);
+                }
+            }
+        }
+        Ok(rows)
+    }
+
     /// The noise of each output, in its unit, as ``Refinement.noise_floor``.
     #[getter]
     fn noise_floor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

@@ -16,7 +16,7 @@ from gpi_hammerstein.cli.output import console, print_json
 from gpi_hammerstein.files import write_atomically
 
 excite: typer.Typer = typer.Typer(
-    no_args_is_help=True, help="Write an excitation signal: multisine, prbs or triangle."
+    no_args_is_help=True, help="Write an excitation signal: multisine, prbs, triangle or steps."
 )
 
 Rate = Annotated[float, typer.Option(help="Sampling rate in Hz.", show_default=False)]
@@ -86,6 +86,21 @@ def triangle(
     """Write triangles whose amplitude falls to zero: nested hysteresis loops, largest first."""
     u = native.decaying_triangle(count(rate, duration), rate, frequency, range_, slew=slew)
     finish(u, {"kind": "triangle", "frequency_hz": frequency}, rate, unit, out, as_json)
+
+
+@excite.command()
+def steps(
+    rate: Rate,
+    duration: Duration,
+    range_: Range,
+    out: Out,
+    slew: Slew = None,
+    unit: Unit = "V",
+    as_json: options.Json = False,
+) -> None:
+    """Write a step to each end and to the middle, held for a quarter of the time: creep and drift."""
+    u = native.held_steps(count(rate, duration), rate, range_, slew=slew)
+    finish(u, {"kind": "steps"}, rate, unit, out, as_json)
 
 
 def count(rate: float, duration: float) -> int:

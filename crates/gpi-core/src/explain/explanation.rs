@@ -74,6 +74,8 @@ pub struct Explanation {
     pub verdict: Verdict,
     /// What to measure next, when that would tell more.
     pub next_experiment: Option<NextExperiment>,
+    /// Isolated wrong samples, which are not scored: rows of each output, in each experiment.
+    pub wrong_samples: Vec<Vec<Vec<usize>>>,
     /// Samples at the start of each experiment that the fit could not use.
     pub warmups: Vec<usize>,
     /// Measured minus simulated outputs of the declared model, (samples, outputs), one an experiment.
@@ -142,6 +144,7 @@ pub(super) fn summarise(
     Ok(Explanation {
         next_experiment: verdict::next_experiment(&rejected, &effects, &tests, verdict, record),
         held_out: mended.experiments().iter().map(|e| e.held_out.clone()).collect(),
+        wrong_samples: search.wrong.clone(),
         warmups: mended.experiments().iter().map(|e| e.warmup).collect(),
         base,
         model,

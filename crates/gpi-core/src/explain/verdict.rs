@@ -68,22 +68,28 @@ pub(crate) fn verdict(effects: &[&str], tests: &[ResidualTest]) -> Verdict {
     }
 }
 
-/// The effects whose pictures are alike, and what tells them apart.
-const APART: [(&[&str], &str); 3] = [
+/// The input that tells most effects apart.
+const TRIANGLE: &str = "triangle";
+
+/// The effects whose pictures are alike, what tells them apart, and the kind of input that does.
+const APART: [(&[&str], &str, &str); 3] = [
     (
         &["creep", "drift", "gain-drift"],
-        "hold the input still for several minutes after a large step, then again without the step: creep \
-         follows the step, drift does not, and a drifting gain shows only away from zero",
+        "hold the input still for minutes, at rest and after large steps: creep follows each step, drift \
+         does not, and a drifting gain shows only away from zero",
+        "steps",
     ),
     (
         &["output-nonlinearity", "hysteresis-shape", "backlash", "stiffness"],
         "drive slow triangles of several sizes around several levels: a sensor's curve depends on the \
          level alone, a loop's shape on its past, and stiffness needs speed",
+        TRIANGLE,
     ),
     (
         &["rate-dependence", "amplifier-slew", "linear-dynamics", "delay"],
         "drive the same triangle at several speeds: a slew limit starts at one speed, loops that open \
          with speed do so at all of them",
+        TRIANGLE,
     ),
 ];
 
@@ -97,20 +103,26 @@ pub(crate) fn next_experiment(
     let (low, high) = crate::identify::point::range(record, 0);
     let rate = record.rate();
     let duration = 600.0_f64.min(1e6 / rate);
-    let triangle = format!(
-        "gpi excite triangle --rate {rate} --duration {duration} --frequency {} --range {low} {high} \
-         -o next.csv",
+    let command = |kind: &str| {
         // a number that can be typed
-        (20e4 / duration).round() / 1e4
-    );
+        let frequency = format!(" --frequency {}", (20e4 / duration).round() / 1e4);
+        let frequency = if kind == TRIANGLE { frequency } else { String::new() };
+        format!(
+            "gpi excite {kind} --rate {rate} --duration {duration}{frequency} --range {low} {high} -o next.csv"
+        )
+    };
     let confounded = rejected.iter().find(|one| !one.confounded_with.is_empty());
     if let Some(one) = confounded {
         let names = |name: &&str| *name == one.effect || one.confounded_with.contains(name);
-        let group = APART.iter().find(|(group, _)| group.iter().filter(|n| names(n)).count() > 1);
+        let alike = |group: &[&str]| group.iter().filter(|name| names(name)).count() > 1;
+        let apart = APART.iter().find(|(group, ..)| alike(group));
         let with = one.confounded_with.join(", ");
-        let how = group.map_or("repeat the experiment with another input", |(_, how)| *how);
+        let (how, kind) = apart
+            .map_or(("repeat the experiment with another input", TRIANGLE), |(_, how, kind)| {
+                (*how, *kind)
+            });
         let why = format!("{} and {with} explain the same here; {how}", one.effect);
-        return Some(NextExperiment { why, command: triangle });
+        return Some(NextExperiment { why, command: command(kind) });
     }
     if verdict == Verdict::Explained {
         return None;
@@ -118,7 +130,7 @@ pub(crate) fn next_experiment(
     if is_one_sine(record) {
         let why = "one cycle that repeats cannot tell a sensor's curve, a loop's shape, stiffness or a mode \
                    from the declared model; drive triangles of several sizes";
-        return Some(NextExperiment { why: why.to_owned(), command: triangle });
+        return Some(NextExperiment { why: why.to_owned(), command: command(TRIANGLE) });
     }
     let worst = tests
         .iter()
@@ -130,5 +142,45 @@ pub(crate) fn next_experiment(
          moves one thing at a time tells more",
         worst.name, worst.points_to
     );
-    Some(NextExperiment { why, command: triangle })
+    Some(NextExperiment { why, command: command(TRIANGLE) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Channel, Experiment, Matrix};
+
+    fn record() -> Record {
+        let input =
+            Matrix::from_fn(1000, 1, |k, _| (0.1 * k as f64).sin() + (0.037 * k as f64).cos());
+        let output = input.clone();
+        let covariates = Matrix::zeros(1000, 0);
+        let run = Experiment { input, output, covariates, warmup: 0, held_out: vec![] };
+        let (u, y) = (vec![Channel::new("u", "V")], vec![Channel::new("y", "um")]);
+        Record::new(vec![run], 1000.0, u, y, vec![]).unwrap()
+    }
+
+    fn confused(effect: &'static str, with: &'static str) -> NextExperiment {
+        let rejected =
+            Rejected { effect, holdout_rms: 1.0, why: String::new(), confounded_with: vec![with] };
+        next_experiment(&[rejected], &[with], &[], Verdict::Explained, &record()).unwrap()
+    }
+
+    #[test]
+    fn the_command_makes_the_input_that_is_asked_for() {
+        let next = confused("drift", "creep");
+        assert!(next.why.contains("hold the input still"), "{}", next.why);
+        assert!(next.command.starts_with("gpi excite steps --rate 1000 --duration 600 --range "));
+        let next = confused("backlash", "hysteresis-shape");
+        assert!(next.why.contains("triangles"), "{}", next.why);
+        assert!(
+            next.command.starts_with("gpi excite triangle ")
+                && next.command.contains("--frequency")
+        );
+    }
+
+    #[test]
+    fn nothing_is_asked_for_where_all_is_explained() {
+        assert_eq!(next_experiment(&[], &[], &[], Verdict::Explained, &record()), None);
+    }
 }
