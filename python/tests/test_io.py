@@ -224,6 +224,32 @@ def test_a_recorder_of_western_europe_is_read(tmp_path: Path) -> None:
     assert gpi.read_record(beside).covariate_names == ["voltage"]
 
 
+def test_names_are_found_below_what_a_recorder_writes_above_them(tmp_path: Path) -> None:
+    path = tmp_path / "scope.csv"
+    rows = "".join(f"{t},{u},{y}\n" for t, u, y in zip(1e3 * T, U, Y, strict=True))
+    path.write_text(f"Model,MSO-5204\nDate,2026-11-02,10:15\n\n# averaged\nt,u,y\n(ms),V,um\n{rows}")
+    recording = read_recording(path)
+    record = recording.record()
+    assert record.input_units == ["V"] and record.output_units == ["um"]
+    assert record.rate == pytest.approx(1 / (T[1] - T[0]))
+    np.testing.assert_allclose(record.u[0][:, 0], U)
+    assert recording.notes == ["2 lines above the names are left out, first `Model,MSO-5204`"]
+
+    path.write_text(f"t_ms,u_V,y_um\n{rows}")
+    assert read_recording(path).notes == []
+    path.write_text(f"t,u,y\n0,none,1\n{rows}")  # a row of text below the names is no line of names
+    refuse(path, "column `u` holds text, first `none` in row 0")
+    path.write_text("hello\n")
+    refuse(path, "no rows below the header line `hello`")
+
+
+def test_a_counter_without_a_unit_is_told(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "r.csv", {"t": np.arange(5), "u_V": U, "y_um": Y})
+    (note,) = read_recording(path).notes
+    assert "taken as seconds, 1 Hz" in note and "--rate" in note
+    assert read_recording(path, rate=50.0).notes == []
+
+
 def test_all_that_is_missing_is_said_at_once(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "r.csv", {"Zeit": T, "Spannung": U, "Weg": Y})
     refuse(path, "--input", "--output", "--time", "Zeit, Spannung, Weg")

@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gpi_hammerstein._native import DataError, ParameterError, Record
 from gpi_hammerstein.io.arrays import read_mat, read_npy_pair, read_npz
 from gpi_hammerstein.io.clock import resample as put_on_grid
@@ -227,7 +229,7 @@ def _read_part(
     signals = [*roles.inputs, *roles.outputs, *roles.covariates]
     table.require_numbers(signals)
     samples = table.stack(signals)
-    pieces, notes, starts = [samples], [], [0.0]
+    pieces, notes, starts = [samples], [*table.notes], [0.0]
     given = rate or table.rate
     if roles.time is not None and rate is None:
         table.require_numbers([roles.time])
@@ -237,10 +239,16 @@ def _read_part(
                 raise ParameterError(f"`resample` = {resample}: a rate in Hz, or `auto` for the usual step")
             asked = None if isinstance(resample, bool | str) else float(resample)
             found = put_on_grid(stamps, samples, asked, table.source)
-            pieces, given, notes = found.pieces, found.rate, [found.note]
+            pieces, given = found.pieces, found.rate
+            notes.append(found.note)
             starts = [0.0] * len(pieces)
         else:
             given, starts = uniform_rate(stamps, table.source), [float(stamps[0])]
+            if not roles.time.unit and (stamps == np.rint(stamps)).all():
+                notes.append(
+                    f"`{roles.time.header}` counts in whole numbers and names no unit: taken as seconds, "
+                    f"{given:g} Hz; where it counts samples, give the rate in Hz (--rate)"
+                )
     elif resample:
         raise ParameterError(
             f"`resample`: {table.source} has no time stamps to resample by; give the rate (--rate)"

@@ -2,7 +2,7 @@
 
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 
 from gpi_hammerstein._native import DataError
 from gpi_hammerstein.io.columns import Column, parse_header
+from gpi_hammerstein.io.header import DECIMAL_COMMA, find_header, is_number
 
 Array = NDArray[np.float64]
-
-# A number as it is written where the comma is the decimal mark; whole numbers have none.
-DECIMAL_COMMA = r"(?i)^[+-]?(\d*(,\d*)?(e[+-]?\d+)?|nan|inf)$"
 
 
 @dataclass(frozen=True)
@@ -30,6 +28,8 @@ class Table:
     """The sampling rate in Hz, when the file states it."""
     warmup: int = 0
     """Samples at the start that are a run-in."""
+    notes: list[str] = field(default_factory=list)
+    """What was done to the file's text."""
 
     def headers(self) -> list[Column]:
         """All columns."""
@@ -72,8 +72,9 @@ def read_csv(path: Path) -> Table:
     Parameters
     ----------
     path
-        Comma, semicolon or tab separated, with one header line, in UTF-8 or Latin-1; lines that start
-        with ``#`` are left out. Where the separator is no comma, numbers may have a decimal comma.
+        Comma, semicolon or tab separated, in UTF-8 or Latin-1. The names are the last line above the
+        numbers, or the last but one above a line of units; what stands above them, and lines that start
+        with ``#``, are left out. Where the separator is no comma, numbers may have a decimal comma.
 
     Returns
     -------
@@ -100,25 +101,33 @@ def read_csv(path: Path) -> Table:
         raise DataError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
     except UnicodeDecodeError:
         raise DataError(f"{path}: not a text file; a CSV record is text, in UTF-8 or Latin-1") from None
-    header = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
-    if not header:
+    header = find_header(text)
+    if header is None:
         raise DataError(f"{path}: the file is empty; a record has a header line and one row a sample")
-    separator = max(",;\t", key=header.count)
-    cells = [cell.strip().strip('"') for cell in header.split(separator)]
-    if all(_is_number(cell) for cell in cells):
-        raise DataError(
-            f"{path}: no header line (row 0 reads `{header[:60]}`); add one such as `t_s,u_V,y_um`"
-        )
-    repeated = sorted({cell for cell in cells if cells.count(cell) > 1})
+    names = header.names
+    if all(map(is_number, names)):
+        first = header.separator.join(names)[:60]
+        raise DataError(f"{path}: no header line (row 0 reads `{first}`); add one such as `t_s,u_V,y_um`")
+    repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
-        raise DataError(f"{path}: {cells.count(repeated[0])} columns are named `{repeated[0]}`; rename them")
+        raise DataError(f"{path}: {names.count(repeated[0])} columns are named `{repeated[0]}`; rename them")
+    if not header.rows:
+        raise DataError(
+            f"{path}: no rows below the header line `{header.separator.join(names)[:60]}`; a record has one "
+            "row a sample"
+        )
     try:
         frame = pl.read_csv(
-            io.BytesIO(text.encode()), separator=separator, comment_prefix="#", infer_schema=False
+            io.BytesIO(header.rows.encode()),
+            separator=header.separator,
+            has_header=False,
+            new_columns=names,
+            comment_prefix="#",
+            infer_schema=False,
         )
     except pl.exceptions.PolarsError as error:
         raise DataError(f"{path}: cannot be read as CSV: {str(error).splitlines()[0]}") from error
-    return from_frame(frame, str(path))
+    return replace(from_frame(frame, str(path)), notes=header.notes)
 
 
 def read_parquet(path: Path) -> Table:
@@ -211,11 +220,3 @@ def decoded(data: bytes) -> str:
         if b"\0" in data:
             raise
         return data.decode("latin-1")
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
