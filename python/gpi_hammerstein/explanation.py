@@ -1,14 +1,17 @@
 """An explanation as the JSON object `gpi-explanation/1`, and in words."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from gpi_hammerstein._native import Explanation, effect_names
+from gpi_hammerstein.stage import stage, stage_in_words
 
 # Parameters of an effect that a sentence can hold.
 SHOWN = 6
+# Wrong samples that a sentence can hold.
+FEW = 4
 
 __all__ = ["failed_in_words", "in_words", "to_dict"]
 
@@ -24,9 +27,9 @@ def to_dict(found: Explanation) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``schema``, ``record``, ``noise_floor``, ``effects``, ``steps``, ``moved_resonance``, ``rejected``,
-        ``error`` (before and after, each train and holdout), ``residual`` (whether it is structured, and its
-        tests), ``verdict``, ``next_experiment``, ``interrupted``.
+        ``schema``, ``record``, ``noise_floor``, ``effects``, ``steps``, ``moved_resonance``, ``stage``,
+        ``rejected``, ``error`` (before and after, each train and holdout), ``residual`` (whether it is
+        structured, and its tests), ``verdict``, ``next_experiment``, ``wrong_samples``, ``interrupted``.
 
     Examples
     --------
@@ -58,6 +61,7 @@ def to_dict(found: Explanation) -> dict[str, Any]:
             for step in found.steps
         ],
         "moved_resonance": found.moved_resonance,
+        "stage": stage(found.model, record),
         "rejected": found.rejected,
         "error": {"before": found.before, "after": found.after},
         "residual": {
@@ -66,6 +70,7 @@ def to_dict(found: Explanation) -> dict[str, Any]:
         },
         "verdict": found.verdict,
         "next_experiment": found.next_experiment,
+        "wrong_samples": found.wrong_samples,
         "interrupted": found.interrupted,
     }
 
@@ -124,6 +129,8 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
             values[SHOWN:] = [f"{len(values) - SHOWN} more"]
         yield f"{name} ({'one more' if name in shown else names[name]}): {', '.join(values)}."
         shown.add(name)
+    if result["wrong_samples"]:
+        yield wrong_in_words(result["wrong_samples"])
     if result["moved_resonance"]:
         small, large = result["moved_resonance"]
         yield (
@@ -135,6 +142,7 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
     for other in result["rejected"]:
         if other["confounded_with"]:
             yield f"{other['effect']} {other['why']}: this record cannot tell them apart."
+    yield from stage_in_words(result["stage"])
     floor = result["noise_floor"]["rms"]
     left = result["error"]["after"]["train"]["rms"]
     yield f"What is left is {left:.4g}{space} rms; the noise floor is {floor:.4g}{space}."
@@ -151,6 +159,23 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
     }[result["verdict"]]
     if result["next_experiment"]:
         yield f"Next: {result['next_experiment']['why']}."
+
+
+def wrong_in_words(wrong: Sequence[Mapping[str, Any]]) -> str:
+    """Return a sentence that says which samples were left out."""
+    several = wrong[-1]["experiment"] > 0
+    where = [
+        f"row {one['row']} of {one['output']}" + (f" in experiment {one['experiment']}" if several else "")
+        for one in wrong[:FEW]
+    ]
+    if len(wrong) > FEW:
+        where.append(f"{len(wrong) - FEW} more")
+    verb = (
+        "sample stands apart from its neighbours and is"
+        if len(wrong) == 1
+        else "samples stand apart from their neighbours and are"
+    )
+    return f"{len(wrong)} {verb} not scored: {join(where)} (counted from 0)."
 
 
 def failed_in_words(tests: Iterable[Mapping[str, Any]]) -> Iterator[str]:

@@ -147,8 +147,16 @@ impl Compensation {
 
     fn __repr__(&self) -> String {
         let (error, before) = (self.found.error.rms, self.found.error_in_proportion.rms);
+        let mut held = String::new();
+        for (count, what) in
+            [(self.found.out_of_reach, "at a limit"), (self.found.too_fast, "held back")]
+        {
+            if count > 0 {
+                held += &format!(", {count} {what}");
+            }
+        }
         format!(
-            "Compensation({} samples, rms error {error:.3e}, {before:.3e} in proportion)",
+            "Compensation({} samples{held}, rms error {error:.3e}, {before:.3e} in proportion)",
             self.found.drive.nrows()
         )
     }

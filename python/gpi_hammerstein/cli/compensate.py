@@ -1,7 +1,7 @@
 """`gpi compensate`: the drive that makes an actuator follow a reference."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import polars as pl
@@ -94,7 +94,7 @@ def compensate(
             preview=None if preview is None else round(preview * model.rate),
             passes=passes,
         )
-    result = {
+    result: dict[str, Any] = {
         "schema": "gpi-compensation/1",
         "model": str(model_file),
         "reference": str(reference_file),
@@ -131,7 +131,13 @@ def compensate(
     screen = console()
     unit = model.output_units[0] if len(set(model.output_units)) == 1 else ""
     rows = {"drive in proportion": found.error_in_proportion, "compensated": found.error}
-    screen.print(error_table(rows, unit, "Predicted error"))
+    screen.print(error_table(rows, unit, "Predicted error; that of the model itself comes on top"))
+    for name, row in result["drive"].items():
+        screen.print(
+            f"{name} goes from {row['lowest']:.4g} to {row['highest']:.4g} {row['unit']}, at most "
+            f"{row['fastest']:.4g} {row['unit']}/s"
+            + ("." if limits else "; no limits were given (--limits).")
+        )
     for effect, why in found.left:
         screen.print(f"[yellow]left[/] {effect}: {escape(why)}; its error comes on top.")
     if found.lead:

@@ -88,8 +88,9 @@ def explain(
 ) -> int:
     """Find out what a record's model lacks, add it, and report the error before and after.
 
-    Effects are confirmed on blocks of the record that take no part in any fit. Ctrl-C ends the search and
-    keeps what was found. Writes model.json, explanation.json and pictures to DIR.
+    Effects are confirmed on blocks of the record that take no part in any fit. Once the declared model is
+    identified, Ctrl-C ends the search and keeps what was found. Writes model.json, explanation.json and
+    pictures to DIR.
     """
     if report and out is None:
         raise ParameterError("`report`: name the folder that it goes to (-o DIR), or use gpi report")

@@ -197,7 +197,8 @@ def residual_in_time(
         ax.axvspan(first / rate, (last - 1) / rate, color=BLACK, alpha=0.08, lw=0)
     limit = found.limit(experiment, output)
     ax.set_ylim(-limit, limit)
-    ax.set_xlabel("time [s]")
+    several = f" in experiment {experiment}" if len(found.record.u) > 1 else ""
+    ax.set_xlabel(f"time [s]{several}")
     ax.set_ylabel(found.label(output))
     ax.set_title(found.title + (" (grey: held out)" if found.held_out[experiment] else ""))
     ax.legend(loc="upper right")

@@ -22,6 +22,8 @@ Draw = Callable[..., object]
 INK = "#0a0b0c"
 # The page's own background, behind legends.
 PAPER = "#fafbfc"
+# Experiments whose residual is drawn in time.
+MOST_EXPERIMENTS = 4
 # Markov parameters that a Hankel matrix is made of, at most.
 MOST_TAPS = 400
 STYLE: dict[Any, Any] = {
@@ -58,8 +60,11 @@ def pictures(found: Explanation) -> Iterator[tuple[str, str, Draw, tuple[float, 
     yield "loop-v", "The hysteresis alone: what the dynamics are driven with.", hysteresis, square
     for index, name in enumerate(record.output_names):
         of = f" of {name}" if len(record.output_names) > 1 else ""
+        for experiment in range(min(len(record.u), MOST_EXPERIMENTS)):
+            when = f", experiment {experiment}" if len(record.u) > 1 else ""
+            draw_time = partial(plot.residual_in_time, found, experiment=experiment, output=index)
+            yield f"time-{index}-{experiment}", f"The residual{of} in time{when}.", draw_time, wide
         draws: list[tuple[str, str, Callable[..., Axes], tuple[float, float]]] = [
-            ("time", f"The residual{of} in time.", plot.residual_in_time, wide),
             ("spectrum", f"The residual{of} over frequency.", plot.residual_spectrum, usual),
             ("input", f"The residual{of} over the input.", plot.residual_over_input, usual),
             ("speed", f"The residual{of} over the input's speed.", plot.residual_over_speed, usual),
