@@ -83,12 +83,15 @@ def first_resonance(model: Model) -> dict[str, float] | None:
 def stage_in_words(found: dict[str, Any]) -> list[str]:
     """Return the same in words: a sentence a pair of channels, where they are few, and the resonance."""
     loops = found["loops"] if len(found["loops"]) <= FEW else []
-    sentences = [
-        f"From {one['input']} to {one['output']}: {one['sensitivity']:.4g} {one['unit']}".rstrip()
-        + f" between {one['range'][0]:.4g} and {one['range'][1]:.4g} {one['unit'].partition('/')[2]}".rstrip()
-        + f", a hysteresis loop {100 * one['width']:.2g} % of the travel wide."
-        for one in loops
-    ]
+    sentences = []
+    for one in loops:
+        gain = f"{one['sensitivity']:.4g} {one['unit']}".rstrip()
+        low, high = (f"{end:.4g}" for end in one["range"])
+        ends = f"between {low} and {high} {one['unit'].partition('/')[2]}".rstrip()
+        sentences.append(
+            f"From {one['input']} to {one['output']} in slow motion: {gain} {ends}, a hysteresis loop "
+            f"{100 * one['width']:.2g} % of the travel wide."
+        )
     resonance = found["first_resonance"]
     if resonance:
         sentences.append(
