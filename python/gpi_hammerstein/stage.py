@@ -71,13 +71,16 @@ def first_resonance(model: Model) -> dict[str, float] | None:
     found = []
     for pole in model.linear.poles:
         if pole.imag > 0:
-            continuous = np.log(complex(pole)) * model.rate
-            damping = -continuous.real / abs(continuous)
+            frequency, damping = natural(pole, model.rate)
             if damping < DAMPED:
-                found.append(
-                    {"frequency_hz": float(abs(continuous)) / (2 * np.pi), "damping": float(damping)}
-                )
+                found.append({"frequency_hz": frequency, "damping": damping})
     return min(found, key=lambda one: one["frequency_hz"]) if found else None
+
+
+def natural(pole: complex, rate: float) -> tuple[float, float]:
+    """Return natural frequency in Hz and damping ratio of a pole at a sampling rate in Hz."""
+    continuous = np.log(complex(pole)) * rate
+    return float(abs(continuous)) / (2 * np.pi), float(-continuous.real / abs(continuous))
 
 
 def stage_in_words(found: dict[str, Any]) -> list[str]:

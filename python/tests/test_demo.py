@@ -87,3 +87,17 @@ def test_the_record_is_made_again_exactly(tmp_path: Path, monkeypatch: pytest.Mo
     again, bundled = (rows(path / "demo.csv.gz") for path in (tmp_path, DATA))
     # other processors round the last digit otherwise
     np.testing.assert_allclose(again, bundled, rtol=0, atol=1.5e-4)
+
+
+def test_its_first_part_is_inverted_though_nothing_lies_just_above_rest() -> None:
+    """The envelope that fits best falls between rest and the next sample, where it was not measured."""
+    whole = gpi.read_record(DATA / "demo.csv.gz")
+    samples = 3 * len(whole.u[0]) // 4
+    u = whole.u[0][:samples]
+    found = gpi.explain(gpi.Record(u, whole.y[0][:samples], whole.rate))
+    lowest, next_lowest = np.unique(u)[:2]
+    assert lowest == 0.0 and next_lowest > 5.0
+    ways_up = np.diff(found.model.hysteresis[0].envelope(np.linspace(0.0, next_lowest, 100)))
+    assert ways_up.min() > 0.0
+    assert found.after["holdout"]["rms"] < 1.1 * found.noise_floor["rms"][0]
+    assert found.model.compensate(np.linspace(5.0, 8.0, 1000)).error["max"] < 1e-9

@@ -150,7 +150,7 @@ def test_the_search_can_be_stopped_and_keeps_what_it_found():
     assert next(iter(in_words(found.to_dict()))).startswith("Stopped before the search had finished")
 
 
-def test_wrong_samples_are_told_however_few(tmp_path):
+def test_wrong_samples_are_told_however_few():
     plant = plants.draw(3, (), None, SECONDS, RATE)
     run = plant.record(0)
     y = np.array(run.y, dtype=float).reshape(-1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from gpi_hammerstein._native import Explanation, Model, effect_names
 from gpi_hammerstein.plot.style import BAND
+from gpi_hammerstein.stage import natural
 
 Row = Sequence[str]
 
@@ -103,12 +104,12 @@ def pole_rows(model: Model) -> Iterator[list[str]]:
     for pole in model.linear.poles:
         if is_late(pole) or pole.imag < 0:
             continue
-        continuous = np.log(complex(pole)) * model.rate
-        time = f"{-1 / continuous.real:.4g}" if continuous.real < 0 else "-"
+        frequency, damping = natural(pole, model.rate)
+        decay = 2 * np.pi * frequency * damping
+        time = f"{1 / decay:.4g}" if decay > 0 else "-"
         text = f"{pole.real:.6f}" + (f" ± {pole.imag:.6f} i" if pole.imag else "")
         if pole.imag or pole.real < 0:
-            frequency = abs(continuous) / (2 * np.pi)
-            yield [text, f"{frequency:.5g}", f"{-continuous.real / abs(continuous):.3g}", time]
+            yield [text, f"{frequency:.5g}", f"{damping:.3g}", time]
         else:
             yield [text, "-", "-", time]
 
