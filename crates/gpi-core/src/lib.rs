@@ -32,20 +32,28 @@ pub mod excitation;
 #[cfg(feature = "identify")]
 pub mod explain;
 #[cfg(feature = "identify")]
+mod fit;
+#[cfg(feature = "identify")]
 pub mod identify;
 #[cfg(feature = "identify")]
 pub mod linear;
 #[cfg(feature = "identify")]
 mod model;
 #[cfg(feature = "identify")]
+mod progress;
+#[cfg(feature = "identify")]
 mod record;
 #[cfg(feature = "identify")]
 mod spectrum;
+#[cfg(feature = "identify")]
+mod uncertainty;
 
 #[cfg(feature = "identify")]
 pub use error::{Error, ErrorKind};
 #[cfg(feature = "identify")]
 pub use model::{Hysteresis, Model, ModelState, SimulationError};
+#[cfg(feature = "identify")]
+pub use progress::Progress;
 #[cfg(feature = "identify")]
 pub use record::{Channel, Experiment, Record, TimeAxis};
 

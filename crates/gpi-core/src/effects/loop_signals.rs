@@ -113,12 +113,12 @@ fn stacked(signals: &[Matrix]) -> Matrix {
 mod tests {
     use super::*;
     use crate::Model;
+    use crate::chain::hysteresis::{Derivatives, Parameters};
+    use crate::chain::looped::{model, record, run};
+    use crate::chain::point::{DynamicsFreedom, Freedom};
     use crate::explain::score::Base;
-    use crate::identify::linearization::Weighting;
-    use crate::identify::looped::{model, record, run};
-    use crate::identify::point::{DynamicsFreedom, Freedom};
-    use crate::identify::preparation::Prepared;
-    use crate::identify::sensitivity::{Derivatives, Parameters};
+    use crate::fit::linearization::Weighting;
+    use crate::fit::preparation::Prepared;
 
     fn next(model: &Model) -> Vec<(bool, Vec<f64>)> {
         let record = record(model, vec![run(1.5, 0.0, 100, vec![])]);

@@ -1,7 +1,7 @@
 //! Jobs on all cores at once.
 
 use crate::Error;
-use crate::identify::Progress;
+use crate::Progress;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
@@ -49,7 +49,7 @@ mod tests {
             true
         };
         let squares = concurrently((0..20).collect(), &mut progress, |job: usize, progress| {
-            crate::identify::report(progress, &job.to_string(), 0.0)?;
+            crate::progress::report(progress, &job.to_string(), 0.0)?;
             Ok(job * job)
         });
         assert_eq!(squares.unwrap(), (0..20).map(|job| job * job).collect::<Vec<_>>());
@@ -58,7 +58,7 @@ mod tests {
 
         let endless = concurrently(vec![1, 2], &mut |_, _| false, |_, progress| {
             loop {
-                crate::identify::report(progress, "endless", 0.0)?;
+                crate::progress::report(progress, "endless", 0.0)?;
             }
             #[allow(unreachable_code)]
             Ok(())

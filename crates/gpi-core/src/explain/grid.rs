@@ -2,11 +2,11 @@
 
 use super::projection::{LEFT, Projection};
 use super::score::Base;
+use crate::chain::free_run::Signals;
+use crate::chain::point::{Point, range};
 use crate::effects::Stage;
-use crate::identify::free_run::Signals;
-use crate::identify::point::{Point, range};
-use crate::identify::preparation::Prepared;
-use crate::identify::refine::RefineOptions;
+use crate::fit::preparation::Prepared;
+use crate::fit::refine::RefineOptions;
 use crate::{Error, Experiment, Matrix};
 use nalgebra::DVector;
 

@@ -2,10 +2,10 @@
 
 use super::search::Search;
 use crate::Error;
-use crate::identify::Progress;
-use crate::identify::levenberg_marquardt::fit;
-use crate::identify::memory::Memory;
-use crate::identify::point::Point;
+use crate::Progress;
+use crate::chain::point::Point;
+use crate::fit::memory::Memory;
+use crate::fit::minimize::fit;
 
 /// What a search had before lags were taken out of its G.
 pub(super) struct Before {

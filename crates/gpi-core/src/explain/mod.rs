@@ -25,10 +25,10 @@ mod search;
 mod trial;
 mod verdict;
 
-use crate::identify::chain::{compare, prepare};
-use crate::identify::levenberg_marquardt::fit;
-use crate::identify::preparation::starts_at_rest;
-use crate::identify::refine::{RefineOptions, Refined, settings};
+use crate::fit::minimize::fit;
+use crate::fit::preparation::starts_at_rest;
+use crate::fit::refine::{RefineOptions, Refined, settings};
+use crate::identify::procedure::{compare, prepare};
 use crate::identify::{Grid, IdentifyOptions, Progress, Refinement};
 use crate::spectrum::is_one_sine;
 use crate::{Error, Matrix, Record};
@@ -83,7 +83,8 @@ pub fn explain(
     let identify = usual_grids(&options.identify, &training);
     // Spikes that stand out of the output itself.
     let outputs: Vec<Matrix> = training.experiments().iter().map(|e| e.output.clone()).collect();
-    let spikes = crate::identify::outliers::places(&outputs, &revision::everything(&training)?, 0);
+    let spikes =
+        crate::uncertainty::outliers::places(&outputs, &revision::everything(&training)?, 0);
     let training = revision::repaired(&training, &outputs, &spikes)?;
     let mut prepared = prepare(&training, &identify)?;
     let measured = as_measured(&prepared.record, record, &prepared.means)?;

@@ -1,11 +1,11 @@
 //! A resonance that moves with the swing: nothing in front of G can do that.
 
-use crate::identify::Progress;
-use crate::identify::levenberg_marquardt::{FitOptions, fit};
-use crate::identify::point::Point;
-use crate::identify::preparation::Prepared;
-use crate::identify::refine::Refined;
-use crate::identify::representatives::Representatives;
+use crate::Progress;
+use crate::chain::point::Point;
+use crate::fit::minimize::{FitOptions, fit};
+use crate::fit::preparation::Prepared;
+use crate::fit::refine::Refined;
+use crate::fit::representatives::Representatives;
 use crate::linear::Section;
 use crate::{Error, Experiment, Record};
 use std::f64::consts::TAU;

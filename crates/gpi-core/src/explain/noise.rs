@@ -4,8 +4,8 @@ use super::residual::{ResidualTest, STRUCTURE};
 use super::search::Search;
 use super::trial::LEAST;
 use crate::effects::{ColouredNoise, Effect, Outliers};
-use crate::identify::colour::Colour;
 use crate::identify::{NoiseFloor, NoiseMethod};
+use crate::uncertainty::noise_model::Colour;
 use crate::{Error, Matrix, Record};
 
 /// What is wrong with the noise, when everything else is explained.

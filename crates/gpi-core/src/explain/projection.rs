@@ -1,10 +1,10 @@
 //! Candidates' columns beside the model's own sensitivities: what the model could absorb does not count.
 
 use super::score::Base;
+use crate::chain::free_run::Signals;
+use crate::chain::stream::{Rows, Stream};
 use crate::effects::{Candidate, Effect, Stage};
-use crate::identify::free_run::Signals;
-use crate::identify::linearization::{Linearization, gather};
-use crate::identify::stream::{Rows, Stream};
+use crate::fit::linearization::{Linearization, gather};
 use crate::{Error, Experiment, Matrix};
 use nalgebra::DVector;
 
@@ -120,12 +120,12 @@ impl Base<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::hysteresis::{Derivatives, Parameters};
+    use crate::chain::looped::{model, record, run};
+    use crate::chain::point::{DynamicsFreedom, Freedom};
     use crate::effects::{InnerLoop, Law, Sees, Stiffness};
-    use crate::identify::linearization::Weighting;
-    use crate::identify::looped::{model, record, run};
-    use crate::identify::point::{DynamicsFreedom, Freedom};
-    use crate::identify::preparation::Prepared;
-    use crate::identify::sensitivity::{Derivatives, Parameters};
+    use crate::fit::linearization::Weighting;
+    use crate::fit::preparation::Prepared;
 
     #[test]
     fn columns_of_loops_are_their_derivatives() {

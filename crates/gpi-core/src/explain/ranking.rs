@@ -3,10 +3,10 @@
 use super::score::{Base, Score, scores};
 use super::search::Search;
 use crate::Error;
+use crate::chain::point::{Layout, Point};
 use crate::effects::{Candidate, Entry};
-use crate::identify::point::{Layout, Point};
-use crate::identify::representatives::representatives;
-use crate::identify::{Progress, report};
+use crate::fit::representatives::representatives;
+use crate::progress::{Progress, report};
 
 /// The best candidate of a family.
 pub(super) struct Ranked {

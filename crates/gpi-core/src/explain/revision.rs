@@ -3,10 +3,11 @@
 use super::ranking::{Ranked, SLOW};
 use super::search::{Round, Search};
 use super::trial::Trial;
+use crate::Progress;
 use crate::effects::Entry;
-use crate::identify::levenberg_marquardt::{FitOptions, Fitted, fit};
-use crate::identify::preparation::rescale;
-use crate::identify::{Progress, outliers};
+use crate::fit::minimize::{FitOptions, Fitted, fit};
+use crate::fit::preparation::rescale;
+use crate::uncertainty::outliers;
 use crate::{Error, Matrix, Record};
 
 impl Search<'_> {

@@ -1,11 +1,11 @@
 //! The score (Lagrange multiplier) test: what a candidate would explain, without fitting it.
 
 use super::projection::{LEFT, Projection};
+use crate::chain::free_run::Signals;
+use crate::chain::point::{Freedom, Point};
 use crate::effects::{Candidate, Effect, Situation};
-use crate::identify::free_run::Signals;
-use crate::identify::linearization::{Linearization, Weighting};
-use crate::identify::point::{Freedom, Point};
-use crate::identify::uncertainty::descending_eigen;
+use crate::fit::linearization::{Linearization, Weighting};
+use crate::uncertainty::covariance::descending_eigen;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::DVector;
 use rayon::prelude::*;

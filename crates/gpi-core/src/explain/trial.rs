@@ -3,12 +3,12 @@
 use super::ranking::Ranked;
 use super::score::Score;
 use super::search::Search;
+use crate::Progress;
+use crate::chain::point::{Layout, Point};
 use crate::effects::{Entry, Stage};
-use crate::identify::Progress;
-use crate::identify::levenberg_marquardt::{FitOptions, Fitted, Status, fit};
-use crate::identify::point::{Layout, Point};
-use crate::identify::refine::Refined;
-use crate::identify::representatives::representatives;
+use crate::fit::minimize::{FitOptions, Fitted, Status, fit};
+use crate::fit::refine::Refined;
+use crate::fit::representatives::representatives;
 use crate::linear::Section;
 use crate::{Error, Record};
 

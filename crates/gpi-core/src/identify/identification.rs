@@ -1,9 +1,9 @@
 //! What is asked of an identification, and what it answers.
 
-use super::Grid;
-use super::refine::Refinement;
-use super::structure::Candidate;
 use crate::Model;
+use crate::fit::Grid;
+use crate::fit::refine::Refinement;
+use crate::identify::structure::Candidate;
 use crate::linear::Fir;
 use crate::operators::Reading;
 
@@ -22,9 +22,9 @@ pub struct IdentifyOptions {
     pub reading: Reading,
     /// Restricts the linear part to a gain with a delay of this many samples.
     pub delay: Option<usize>,
-    /// As in [`RefineOptions`](super::RefineOptions).
+    /// As in [`RefineOptions`](crate::identify::RefineOptions).
     pub robust: Option<bool>,
-    /// As in [`RefineOptions`](super::RefineOptions).
+    /// As in [`RefineOptions`](crate::identify::RefineOptions).
     pub offset_knots: usize,
 }
 

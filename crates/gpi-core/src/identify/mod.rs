@@ -8,60 +8,19 @@
 //!
 //! Everything is fitted and chosen on the record that is given.
 
-mod adjoint;
-mod bands;
-mod bridge;
-pub(crate) mod chain;
-pub(crate) mod colour;
-mod dynamic;
-mod dynamics;
-mod fit_start;
-pub(crate) mod free_run;
-mod grid;
-mod hysteresis;
+mod alternation;
 mod identification;
-mod injections;
-mod inner_loops;
-mod lanes;
-pub(crate) mod levenberg_marquardt;
-pub(crate) mod linearization;
-#[cfg(test)]
-pub(crate) mod looped;
-pub(crate) mod memory;
-mod motion;
-mod names;
-pub(crate) mod noise_floor;
-pub(crate) mod outliers;
-mod placement;
-pub(crate) mod point;
-pub(crate) mod preparation;
+pub(crate) mod procedure;
 mod quasi_static;
-pub(crate) mod refine;
-pub(crate) mod representatives;
-mod sensing;
-mod sensitivities;
-pub(crate) mod sensitivity;
-pub(crate) mod stream;
+mod realization;
 pub(crate) mod structure;
-mod tangents;
-pub(crate) mod uncertainty;
 
-pub use bands::{PoleDeviations, ResponseDeviation};
-pub use chain::identify;
-pub use fit_start::residuals_from_fitted_start;
-pub use grid::Grid;
-pub use hysteresis::{HysteresisFit, fit_hysteresis};
+pub use crate::fit::{
+    Grid, HysteresisFit, Parameter, RefineOptions, Refinement, Sensitivities, Status,
+    fit_hysteresis, refine, residuals_from_fitted_start, sensitivities,
+};
+pub use crate::progress::Progress;
+pub use crate::uncertainty::{NoiseFloor, NoiseMethod, PoleDeviations, ResponseDeviation};
 pub use identification::{Identification, IdentifyOptions, Round};
-pub use levenberg_marquardt::Status;
-pub use noise_floor::{NoiseFloor, NoiseMethod};
-pub use refine::{Parameter, RefineOptions, Refinement, refine};
-pub use sensitivities::{Sensitivities, sensitivities};
+pub use procedure::identify;
 pub use structure::Candidate;
-
-/// Called with the stage's name and the fraction done (0 to 1); `false` asks to stop, which ends the
-/// work with [`Error::Interrupted`](crate::Error::Interrupted).
-pub type Progress<'a> = &'a mut dyn FnMut(&str, f64) -> bool;
-
-pub(crate) fn report(progress: Progress, stage: &str, done: f64) -> Result<(), crate::Error> {
-    if progress(stage, done) { Ok(()) } else { Err(crate::Error::Interrupted) }
-}

@@ -1,13 +1,13 @@
 //! Hysteresis behind a gain with a delay, where the input excites no more.
 
-use super::identification::Round;
-use super::levenberg_marquardt::fit;
-use super::point::{DynamicsFreedom, Point};
-use super::preparation::{Prepared, rescale};
-use super::refine::{RefineOptions, settings};
-use super::{Progress, report};
 use crate::Error;
+use crate::chain::point::{DynamicsFreedom, Point};
+use crate::fit::minimize::fit;
+use crate::fit::preparation::{Prepared, rescale};
+use crate::fit::refine::{RefineOptions, settings};
+use crate::identify::identification::Round;
 use crate::linear::{self, Sections};
+use crate::progress::{Progress, report};
 
 /// The linear part is a gain of plus or minus one with the delay that fits best, and with one sample
 /// less and more.

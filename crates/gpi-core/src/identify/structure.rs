@@ -1,14 +1,15 @@
 //! The structure from the data: how many plays and deadzones, which order and delay.
 
-use super::identification::IdentifyOptions;
-use super::levenberg_marquardt::fit;
-use super::memory::Memory;
-use super::point::{DynamicsFreedom, Point, range};
-use super::preparation::{Prepared, rescale};
-use super::refine::{RefineOptions, Refined, joint, settings};
-use super::sensitivity::Parameters;
-use super::{Grid, Progress};
+use crate::Progress;
+use crate::chain::hysteresis::Parameters;
+use crate::chain::point::{DynamicsFreedom, Point, range};
 use crate::effects::longest_lag;
+use crate::fit::Grid;
+use crate::fit::memory::Memory;
+use crate::fit::minimize::fit;
+use crate::fit::preparation::{Prepared, rescale};
+use crate::fit::refine::{RefineOptions, Refined, joint, settings};
+use crate::identify::identification::IdentifyOptions;
 use crate::linear::Sections;
 use crate::{Error, Record};
 use std::f64::consts::PI;

@@ -3,8 +3,8 @@
 use super::chance::exceeded_with;
 use super::{Beside, ResidualTest};
 use crate::Matrix;
-use crate::identify::colour::Colour;
 use crate::spectrum::tapered;
+use crate::uncertainty::noise_model::Colour;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 

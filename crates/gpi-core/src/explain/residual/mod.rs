@@ -14,7 +14,7 @@ mod simulated;
 mod whiteness;
 mod wrong_samples;
 
-use crate::identify::refine::require_match;
+use crate::fit::refine::require_match;
 use crate::identify::{Progress, residuals_from_fitted_start};
 use crate::{Error, Matrix, Model, Record};
 use families::{Family, Signals};

@@ -2,7 +2,7 @@
 
 use super::chance::at_least;
 use super::{Beside, ResidualTest};
-use crate::identify::outliers;
+use crate::uncertainty::outliers;
 
 /// How many samples stand apart from their neighbours by more than six robust standard deviations.
 pub(super) fn wrong_samples(beside: &Beside, output: usize) -> ResidualTest {

@@ -1,15 +1,16 @@
 //! The whole chain: excitation, start, rounds, model.
 
-use super::dynamic::{self, Taps};
-use super::identification::{Identification, IdentifyOptions, Round};
-use super::point::range;
-use super::preparation::Prepared;
-use super::quasi_static;
-use super::refine::Refined;
-use super::sensitivity::Parameters;
-use super::structure::{Candidate, Search};
-use super::{Grid, Progress, report};
+use crate::chain::hysteresis::Parameters;
+use crate::chain::point::range;
+use crate::fit::Grid;
+use crate::fit::preparation::Prepared;
+use crate::fit::refine::Refined;
+use crate::identify::alternation::{self, Taps};
+use crate::identify::identification::{Identification, IdentifyOptions, Round};
+use crate::identify::quasi_static;
+use crate::identify::structure::{Candidate, Search};
 use crate::linear::{Fir, excitation_limit};
+use crate::progress::{Progress, report};
 use crate::{Error, Record};
 
 /// Identifies a model from a record.
@@ -106,14 +107,14 @@ pub(crate) fn compare(
     let largest = (1200 / inputs).min(1024).min(supported).min(affordable);
     let count = options.taps.unwrap_or(largest.min(400));
     let mut taps = Taps { count, largest: options.taps.unwrap_or(largest) };
-    let seed = dynamic::seed(prepared, &grid, &mut taps, options.order, progress)?;
+    let seed = alternation::seed(prepared, &grid, &mut taps, options.order, progress)?;
     let mut search = Search::new(prepared, options);
     search.fast = fast;
     search.climb(&seed.point, progress)?;
     if options.order.is_none() {
         let mut quiet = |_: &str, _: f64| true;
         let mut dynamics = |driven: &Record, order: usize| {
-            dynamic::dynamics_of(driven, &mut taps, Some(order), &mut quiet)?.sections()
+            alternation::dynamics_of(driven, &mut taps, Some(order), &mut quiet)?.sections()
         };
         search.orders(&mut dynamics, progress)?;
     }

@@ -1,13 +1,13 @@
 //! How far the estimates may be from the truth: the covariance of a least squares fit under coloured
 //! noise.
 
-use super::colour::Colour;
-use super::levenberg_marquardt::{FitOptions, Fitted};
-use super::linearization::{Weighting, gather};
-use super::point::{Bounds, Freedom, Layout, Point};
-use super::representatives::{representatives, streamed};
-use super::stream::Stream;
+use crate::chain::point::{Bounds, Freedom, Layout, Point};
+use crate::chain::stream::Stream;
+use crate::fit::linearization::{Weighting, gather};
+use crate::fit::minimize::{FitOptions, Fitted};
+use crate::fit::representatives::{representatives, streamed};
 use crate::linear::{NormalEquations, symmetric_eigen};
+use crate::uncertainty::noise_model::Colour;
 use crate::{Error, Matrix, Record};
 use nalgebra::DVector;
 

@@ -1,16 +1,16 @@
 //! Joint refinement of all parts of a model.
 
-use super::levenberg_marquardt::{FitOptions, Fitted, Status, fit};
-use super::linearization::Weighting;
-use super::noise_floor::NoiseFloor;
-use super::outliers;
-use super::point::{DynamicsFreedom, Freedom, Layout, Point};
-use super::preparation::Prepared;
-use super::representatives::representatives;
-use super::sensitivities::names_and_values;
-use super::sensitivity::{Derivatives, Parameters};
-use super::uncertainty::Uncertainty;
-use super::{Progress, report};
+use crate::chain::hysteresis::{Derivatives, Parameters};
+use crate::chain::point::{DynamicsFreedom, Freedom, Layout, Point};
+use crate::fit::linearization::Weighting;
+use crate::fit::minimize::{FitOptions, Fitted, Status, fit};
+use crate::fit::preparation::Prepared;
+use crate::fit::representatives::representatives;
+use crate::fit::sensitivities::names_and_values;
+use crate::progress::{Progress, report};
+use crate::uncertainty::covariance::Uncertainty;
+use crate::uncertainty::noise_floor::NoiseFloor;
+use crate::uncertainty::outliers;
 use crate::{Error, Matrix, Model, Record};
 
 /// What a refinement may move besides weights, deadzone weights, dynamics and offset, and how residuals

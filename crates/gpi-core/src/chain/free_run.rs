@@ -1,9 +1,9 @@
 //! A point run free over the record, stage by stage, and the model that it is.
 
-use super::motion::Motion;
-use super::point::{Past, Point};
-use super::sensitivity::{Beside, Parameters};
-use super::stream::hats;
+use crate::chain::hysteresis::{Beside, Parameters};
+use crate::chain::motion::Motion;
+use crate::chain::point::{Past, Point};
+use crate::chain::stream::hats;
 use crate::effects::{Block, Effect, InnerLoop, Moment, Stage};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};

@@ -1,6 +1,6 @@
 //! What every unknown is called in results.
 
-use super::point::{Layout, Point};
+use crate::chain::point::{Layout, Point};
 use crate::{Channel, Record};
 
 impl Layout {

@@ -1,6 +1,6 @@
 //! The output stage of one output.
 
-use super::point::Point;
+use crate::chain::point::Point;
 use crate::effects::{Effect, Moment, Slope, Stage};
 
 /// The effects of the output stage on one output, with what they remember.

@@ -1,6 +1,6 @@
 //! Everything that is estimated, as one point, and where each unknown stands in a step away from it.
 
-use super::sensitivity::{Derivatives, Parameters};
+use crate::chain::hysteresis::{Derivatives, Parameters};
 use crate::effects::{Effect, Stage};
 use crate::linear::Sections;
 use crate::{Matrix, Record};

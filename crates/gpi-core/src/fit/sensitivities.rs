@@ -1,19 +1,19 @@
 //! The derivatives that a refinement uses, handed out: for experiment design, other optimizers, checks.
 
-use super::linearization::{Linearization, Weighting};
-use super::point::{Layout, Point};
-use super::preparation::Prepared;
-use super::refine::{RefineOptions, require_match, settings};
-use super::sensitivity::Parameters;
-use super::stream::Stream;
-use super::{Progress, report};
+use crate::chain::hysteresis::Parameters;
+use crate::chain::point::{Layout, Point};
+use crate::chain::stream::Stream;
+use crate::fit::linearization::{Linearization, Weighting};
+use crate::fit::preparation::Prepared;
+use crate::fit::refine::{RefineOptions, require_match, settings};
+use crate::progress::{Progress, report};
 use crate::{Error, Matrix, Model, Record};
 use nalgebra::DVector;
 
 /// Derivatives of a model's simulated output with respect to everything that a refinement moves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensitivities {
-    /// What each column is the derivative by, as in [`Parameter`](super::Parameter).
+    /// What each column is the derivative by, as in [`Parameter`](crate::identify::Parameter).
     pub names: Vec<String>,
     /// The values at which the derivatives were taken.
     pub values: Vec<f64>,
@@ -34,7 +34,7 @@ pub struct Sensitivities {
 /// the largest DC gain of the input makes up for it.
 ///
 /// # Errors
-/// As for [`refine`](super::refine).
+/// As for [`refine`](crate::identify::refine).
 pub fn sensitivities(
     model: &Model,
     record: &Record,

@@ -1,6 +1,6 @@
 //! Parts of a few experiments that stand for all where the derivatives of a whole record would take long.
 
-use super::point::{Layout, Point};
+use crate::chain::point::{Layout, Point};
 use crate::{Error, Experiment, Matrix, Record};
 
 /// Chosen experiments, and how much of the record they are.
@@ -133,11 +133,11 @@ impl Representatives {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::linearization::{Linearization, Weighting};
-    use crate::identify::looped::{model, record, run};
-    use crate::identify::point::{DynamicsFreedom, Freedom};
-    use crate::identify::preparation::Prepared;
-    use crate::identify::sensitivity::{Derivatives, Parameters};
+    use crate::chain::hysteresis::{Derivatives, Parameters};
+    use crate::chain::looped::{model, record, run};
+    use crate::chain::point::{DynamicsFreedom, Freedom};
+    use crate::fit::linearization::{Linearization, Weighting};
+    use crate::fit::preparation::Prepared;
 
     const FREEDOM: Freedom = Freedom {
         weights: true,

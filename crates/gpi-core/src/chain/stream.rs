@@ -1,12 +1,12 @@
 //! One experiment streamed through the hysteresis of every input, through G and the output stage, and
 //! through all of their derivatives.
 
-use super::injections::{ONE, Signals};
-use super::motion::Motion;
-use super::point::{Layout, Past, Point};
-use super::sensing::Sensing;
-use super::sensitivity::{Derivatives, Sensitivity};
-use super::tangents::{Tangents, Trace};
+use crate::chain::hysteresis::{Derivatives, Sensitivity};
+use crate::chain::injections::{ONE, Signals};
+use crate::chain::motion::Motion;
+use crate::chain::point::{Layout, Past, Point};
+use crate::chain::sensing::Sensing;
+use crate::chain::tangents::{Tangents, Trace};
 use crate::effects::Stage;
 use crate::{Error, Experiment, Matrix};
 

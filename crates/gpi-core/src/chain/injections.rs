@@ -1,8 +1,8 @@
 //! Where a change of each unknown enters the chain behind the hysteresis.
 
-use super::point::{Layout, Point};
-use super::sensitivity::{Derivatives, Sensitivity};
 use crate::Matrix;
+use crate::chain::hysteresis::{Derivatives, Sensitivity};
+use crate::chain::point::{Layout, Point};
 use crate::effects::{InnerLoop, Law, Sees};
 use std::ops::Range;
 

@@ -1,8 +1,8 @@
 //! How long G may remember, where what is slower has a name of its own.
 
-use super::point::Point;
-use super::preparation::rescale;
+use crate::chain::point::Point;
 use crate::effects::longest_lag;
+use crate::fit::preparation::rescale;
 use crate::linear::Sections;
 use crate::{Error, Record};
 use nalgebra::{Complex, DVector};

@@ -1,6 +1,6 @@
 //! G with what stands beside it and in its loops, sample by sample.
 
-use super::point::Point;
+use crate::chain::point::Point;
 use crate::effects::InnerLoop;
 use crate::linear::{Section, advance};
 

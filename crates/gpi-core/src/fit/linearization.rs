@@ -1,10 +1,10 @@
 //! The model linearized around a point, gathered into normal equations.
 
-use super::adjoint::descent;
-use super::levenberg_marquardt::FitOptions;
-use super::point::{Freedom, Layout, Point};
-use super::representatives::{representatives, streamed};
-use super::stream::{Rows, Stream};
+use crate::chain::adjoint::descent;
+use crate::chain::point::{Freedom, Layout, Point};
+use crate::chain::stream::{Rows, Stream};
+use crate::fit::minimize::FitOptions;
+use crate::fit::representatives::{representatives, streamed};
 use crate::linear::NormalEquations;
 use crate::{Error, Matrix, Record};
 use nalgebra::DVector;

@@ -1,10 +1,11 @@
 //! The hysteresis fitted behind given dynamics.
 
-use super::levenberg_marquardt::{FitOptions, Status, fit};
-use super::linearization::Weighting;
-use super::point::{DynamicsFreedom, Freedom, Past, Point, range};
-use super::sensitivity::{Derivatives, Parameters};
-use super::{Grid, Progress};
+use crate::Progress;
+use crate::chain::hysteresis::{Derivatives, Parameters};
+use crate::chain::point::{DynamicsFreedom, Freedom, Past, Point, range};
+use crate::fit::Grid;
+use crate::fit::linearization::Weighting;
+use crate::fit::minimize::{FitOptions, Status, fit};
 use crate::linear::Sections;
 use crate::operators::Reading;
 use crate::{Channel, Error, Experiment, Hysteresis, Matrix, Record};

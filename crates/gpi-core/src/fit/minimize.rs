@@ -1,9 +1,9 @@
 //! Gauss-Newton with Levenberg and Marquardt's damping, within bounds.
 
-use super::linearization::{Linearization, Weighting};
-use super::point::{Freedom, Point};
-use super::{Progress, report};
+use crate::chain::point::{Freedom, Point};
+use crate::fit::linearization::{Linearization, Weighting};
 use crate::linear::bounded;
+use crate::progress::{Progress, report};
 use crate::{Error, Record};
 
 /// How a fit ended.

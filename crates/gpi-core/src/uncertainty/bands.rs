@@ -1,8 +1,8 @@
 //! Standard deviations of what engineers look at: poles, Markov parameters, frequency response, loop.
 
-use super::point::Point;
-use super::refine::Refinement;
+use crate::chain::point::Point;
 use crate::effects::{Effect, Units};
+use crate::fit::refine::Refinement;
 use crate::linear::Sections;
 use crate::{Error, Matrix};
 use nalgebra::{DMatrix, DVector};
@@ -144,7 +144,8 @@ impl Refinement {
     pub fn loop_deviations(&self, input: &Matrix) -> Result<Matrix, Error> {
         let inputs = self.point.channels.len();
         Error::require_equal("channels", ("input", input.ncols()), ("model", inputs))?;
-        let rest = super::point::Past { plays: None, moving: false, state: DVector::zeros(0) };
+        let rest =
+            crate::chain::point::Past { plays: None, moving: false, state: DVector::zeros(0) };
         let deviations =
             self.spread(|point| Ok(point.intermediate(input, &rest).as_slice().to_vec()))?;
         Ok(Matrix::from_column_slice(input.nrows(), inputs, &deviations))

@@ -1,8 +1,8 @@
 //! Derivatives by all unknowns, taken through G, its loops and the output stage side by side.
 
-use super::injections::{Injection, Places, Signals, injections};
-use super::lanes::{LANES, Lanes, NONE, Weights, add, pass, relax};
-use super::point::{Layout, Point};
+use crate::chain::injections::{Injection, Places, Signals, injections};
+use crate::chain::lanes::{LANES, Lanes, NONE, Weights, add, pass, relax};
+use crate::chain::point::{Layout, Point};
 use crate::effects::{InnerLoop, Sees, Slope, Stage};
 use crate::linear::Section;
 use crate::{Experiment, Matrix};

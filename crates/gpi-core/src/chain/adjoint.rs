@@ -1,11 +1,11 @@
 //! The gradient of the cost by all unknowns at once: one pass through an experiment, and one back.
 
-use super::injections::{Injection, Places, injections};
-use super::linearization::Weighting;
-use super::point::{Freedom, Layout, Point};
-use super::stream::Stream;
-use super::tangents::{Trace, by_states, sensed};
+use crate::chain::injections::{Injection, Places, injections};
+use crate::chain::point::{Freedom, Layout, Point};
+use crate::chain::stream::Stream;
+use crate::chain::tangents::{Trace, by_states, sensed};
 use crate::effects::{InnerLoop, Law, Sees, Slope};
+use crate::fit::linearization::Weighting;
 use crate::linear::{Section, dot};
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{DMatrixView, DVector};
@@ -266,11 +266,11 @@ fn add(sum: &mut [f64], factor: f64, values: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::linearization::Linearization;
-    use crate::identify::looped::{model, record, run};
-    use crate::identify::point::DynamicsFreedom;
-    use crate::identify::preparation::Prepared;
-    use crate::identify::sensitivity::{Derivatives, Parameters};
+    use crate::chain::hysteresis::{Derivatives, Parameters};
+    use crate::chain::looped::{model, record, run};
+    use crate::chain::point::DynamicsFreedom;
+    use crate::fit::linearization::Linearization;
+    use crate::fit::preparation::Prepared;
 
     #[test]
     fn gradient_is_the_one_that_all_derivatives_give() {

@@ -1,11 +1,11 @@
 //! The state that a record starts from, fitted with the model kept.
 
-use super::Progress;
-use super::levenberg_marquardt::{Fitted, fit};
-use super::point::DynamicsFreedom;
-use super::preparation::Prepared;
-use super::refine::{RefineOptions, require_match, settings};
-use super::sensitivity::Parameters;
+use crate::Progress;
+use crate::chain::hysteresis::Parameters;
+use crate::chain::point::DynamicsFreedom;
+use crate::fit::minimize::{Fitted, fit};
+use crate::fit::preparation::Prepared;
+use crate::fit::refine::{RefineOptions, require_match, settings};
 use crate::{Error, Matrix, Model, Record};
 
 /// Measured minus simulated outputs of each experiment, (samples, outputs), where the start of

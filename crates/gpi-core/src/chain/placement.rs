@@ -1,7 +1,7 @@
 //! Plays and deadzones that come and go.
 
-use super::point::{Layout, Point};
 use crate::Matrix;
+use crate::chain::point::{Layout, Point};
 
 impl Point {
     /// The point with one more play, where there is none of its half-width; its past lies between those of

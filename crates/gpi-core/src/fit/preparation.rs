@@ -1,11 +1,11 @@
 //! What every fit starts from: the past of each experiment, and outputs without their means.
 
-use super::Grid;
-use super::hysteresis::forgets_at;
-use super::inner_loops::sections_of;
-use super::point::{Past, Point};
-use super::sensitivity::Parameters;
+use crate::chain::hysteresis::Parameters;
+use crate::chain::point::{Past, Point};
 use crate::effects::{Block, Effect, Sees};
+use crate::fit::Grid;
+use crate::fit::hysteresis::forgets_at;
+use crate::fit::model_sections::sections_of;
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::DVector;

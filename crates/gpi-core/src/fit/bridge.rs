@@ -1,10 +1,10 @@
 //! Where the record shows nothing of the envelope, it does not fall.
 
-use super::Progress;
-use super::levenberg_marquardt::{FitOptions, Fitted, fit};
-use super::preparation::Prepared;
-use super::refine::Refined;
-use super::sensitivity::Parameters;
+use crate::Progress;
+use crate::chain::hysteresis::Parameters;
+use crate::fit::minimize::{FitOptions, Fitted, fit};
+use crate::fit::preparation::Prepared;
+use crate::fit::refine::Refined;
 use crate::operators::Reading;
 use crate::{Error, Record};
 

@@ -1,15 +1,15 @@
 //! Hysteresis and linear dynamics in turn, until nothing is gained.
 
-use super::Grid;
-use super::dynamics::{self, Dynamics};
-use super::identification::Round;
-use super::levenberg_marquardt::fit;
-use super::point::{DynamicsFreedom, Point};
-use super::preparation::{Prepared, rescale};
-use super::refine::{RefineOptions, settings};
-use super::sensitivity::Parameters;
-use super::{Progress, report};
+use crate::chain::hysteresis::Parameters;
+use crate::chain::point::{DynamicsFreedom, Point};
+use crate::fit::Grid;
+use crate::fit::minimize::fit;
+use crate::fit::preparation::{Prepared, rescale};
+use crate::fit::refine::{RefineOptions, settings};
+use crate::identify::identification::Round;
+use crate::identify::realization::{self, Dynamics};
 use crate::linear::{self, Fir};
+use crate::progress::{Progress, report};
 use crate::{Error, Record};
 
 /// Regularization of the FIR estimates, see [`linear::estimate`].
@@ -106,13 +106,13 @@ pub(crate) fn dynamics_of(
 ) -> Result<Dynamics, Error> {
     let mut check = || report(progress, "dynamics", 0.0);
     let record = &record.pieces(taps.largest)?;
-    let found = dynamics::estimate(record, taps.count, RIDGE, order, &mut check)?;
+    let found = realization::estimate(record, taps.count, RIDGE, order, &mut check)?;
     // taps until the slowest pole has decayed to one percent
     let radius = found.refit.system.spectral_radius()?;
     let needed = (0.01_f64.ln() / radius.ln()) as usize;
     if needed > taps.count + taps.count / 5 && taps.count < taps.largest {
         taps.count = needed.min(taps.largest);
-        return dynamics::estimate(record, taps.count, RIDGE, order, &mut check);
+        return realization::estimate(record, taps.count, RIDGE, order, &mut check);
     }
     Ok(found)
 }

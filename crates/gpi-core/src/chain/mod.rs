@@ -1,0 +1,17 @@
+//! The differentiable signal chain of the estimator.
+
+pub(crate) mod adjoint;
+pub(crate) mod free_run;
+pub(crate) mod hysteresis;
+pub(crate) mod injections;
+mod lanes;
+#[cfg(test)]
+pub(crate) mod looped;
+mod model;
+mod motion;
+mod names;
+mod placement;
+pub(crate) mod point;
+mod sensing;
+pub(crate) mod stream;
+pub(crate) mod tangents;

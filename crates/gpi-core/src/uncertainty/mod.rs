@@ -1,0 +1,10 @@
+//! How sure an estimate is: covariance, bands, the noise and its model, wrong samples.
+
+mod bands;
+pub(crate) mod covariance;
+pub(crate) mod noise_floor;
+pub(crate) mod noise_model;
+pub(crate) mod outliers;
+
+pub use bands::{PoleDeviations, ResponseDeviation};
+pub use noise_floor::{NoiseFloor, NoiseMethod};
