@@ -40,6 +40,8 @@ pub mod linear;
 #[cfg(feature = "identify")]
 mod model;
 #[cfg(feature = "identify")]
+mod optimize;
+#[cfg(feature = "identify")]
 mod progress;
 #[cfg(feature = "identify")]
 mod record;

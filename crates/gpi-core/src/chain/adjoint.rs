@@ -1,12 +1,13 @@
 //! The gradient of the cost by all unknowns at once: one pass through an experiment, and one back.
 
-use crate::chain::injections::{Injection, Places, injections};
-use crate::chain::point::{Freedom, Layout, Point};
-use crate::chain::stream::Stream;
-use crate::chain::tangents::{Trace, by_states, sensed};
+use super::injections::{Injection, Places, injections};
+use super::point::{Freedom, Point};
+use super::stream::Stream;
+use super::table::{Group, Table};
+use super::tangents::{Trace, by_states, sensed};
 use crate::effects::{InnerLoop, Law, Sees, Slope};
-use crate::fit::linearization::Weighting;
 use crate::linear::{Section, dot};
+use crate::optimize::Loss;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{DMatrixView, DVector};
 use rayon::prelude::*;
@@ -17,18 +18,18 @@ use rayon::prelude::*;
 /// enters, at the price of one more simulation whatever the number of unknowns.
 pub(crate) fn descent(
     point: &Point,
-    layout: &Layout,
+    table: &Table,
     freedom: Freedom,
-    weighting: &Weighting,
+    loss: &Loss,
     record: &Record,
     check: &mut dyn FnMut() -> Result<(), Error>,
 ) -> Result<(DVector<f64>, f64), Error> {
-    let mut sum = (DVector::zeros(layout.len), 0.0);
+    let mut sum = (DVector::zeros(table.len), 0.0);
     let all: Vec<(usize, &Experiment)> = record.experiments().iter().enumerate().collect();
     for some in all.chunks(rayon::current_num_threads()) {
         check()?;
         let of = |&(index, experiment): &(usize, &Experiment)| {
-            descent_of(point, layout, freedom, weighting, experiment, index)
+            descent_of(point, table, freedom, loss, experiment, index)
         };
         let found: Vec<_> = some.par_iter().map(of).collect();
         for one in found {
@@ -42,21 +43,21 @@ pub(crate) fn descent(
 /// The same of one experiment.
 fn descent_of(
     point: &Point,
-    layout: &Layout,
+    table: &Table,
     freedom: Freedom,
-    weighting: &Weighting,
+    loss: &Loss,
     experiment: &Experiment,
     index: usize,
 ) -> Result<(DVector<f64>, f64), Error> {
-    let mut stream = Stream::new(point, layout, freedom.derivatives, experiment, index)?;
-    let mut descent = DVector::zeros(layout.len);
+    let mut stream = Stream::new(point, table, freedom.derivatives, experiment, index)?;
+    let mut descent = DVector::zeros(table.len);
     let mut cost = 0.0;
     let mut blocks = stream.traces();
     for (trace, residuals) in &mut blocks {
         for (mut column, k) in residuals.column_iter_mut().zip(&trace.scored) {
             for (output, value) in column.iter_mut().enumerate() {
-                let (weight, loss) = weighting.of(output, *value);
-                cost += loss;
+                let (weight, own) = loss.of(output, *value);
+                cost += own;
                 *value *= weight;
                 let said = *value;
                 stream.added(output, trace.samples.start + k, |unknown, derivative| {
@@ -67,7 +68,7 @@ fn descent_of(
     }
     let signals = stream.signals();
     let places = Places::new(point);
-    let injections = injections(point, layout, index, signals, &places);
+    let injections = injections(point, table, index, signals, &places);
     let mut back = Back::new(point, &places, signals.len, experiment.warmup);
     for (trace, residuals) in blocks.iter().rev() {
         back.run(trace, residuals);
@@ -75,7 +76,7 @@ fn descent_of(
     for Injection { unknown, place, signal, factor } in injections {
         descent[unknown] += factor * back.met[(place, signal)];
     }
-    for (unknown, said) in layout.states[index].clone().zip(back.start) {
+    for (unknown, said) in table.range(Group::State { experiment: index }).zip(back.start) {
         descent[unknown] += said;
     }
     Ok((descent, cost))
@@ -261,47 +262,4 @@ impl<'a> Back<'a> {
 
 fn add(sum: &mut [f64], factor: f64, values: &[f64]) {
     sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::chain::hysteresis::{Derivatives, Parameters};
-    use crate::chain::looped::{model, record, run};
-    use crate::chain::point::DynamicsFreedom;
-    use crate::fit::linearization::Linearization;
-    use crate::fit::preparation::Prepared;
-
-    #[test]
-    fn gradient_is_the_one_that_all_derivatives_give() {
-        let model = model();
-        // one with a run-in from rest, and one that begins in motion and holds samples out
-        let runs = vec![run(1.5, 0.0, 130, vec![]), run(1.5, 0.3, 0, vec![300..420, 500..520])];
-        let record = record(&model, runs);
-        let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
-        let prepared = Prepared::scoring_all(&record, channels).unwrap();
-        let mut point = prepared.point_of(&model).unwrap();
-        point.dynamics.delay = 2;
-        point.pasts[1].state.iter_mut().enumerate().for_each(|(j, x)| *x = 0.1 * (j + 1) as f64);
-        let freedom = Freedom {
-            weights: true,
-            derivatives: Derivatives { thresholds: true, half_widths: true, starts: true },
-            identity: true,
-            dynamics: DynamicsFreedom::Everything,
-        };
-        let weighting = Weighting { outputs: vec![1.0, 0.4], turns: vec![0.8, f64::INFINITY] };
-        let record = &prepared.record;
-        let mut check = || Ok(());
-        let all = Linearization::new(&point, record, freedom, &weighting, &mut check).unwrap();
-        let layout = &all.layout;
-        let (found, cost) =
-            descent(&point, layout, freedom, &weighting, record, &mut check).unwrap();
-        let expected = all.descent();
-        assert!((cost / all.cost - 1.0).abs() < 1e-12);
-        assert!(expected.iter().filter(|value| value.abs() > 1e-6).count() > layout.len * 9 / 10);
-        for (i, (found, expected)) in found.iter().zip(expected.iter()).enumerate() {
-            let scale = (all.equations.gram[(i, i)] * all.cost).sqrt();
-            assert!((found - expected).abs() <= 1e-11 * scale, "{i}: {found} {expected}");
-        }
-    }
 }

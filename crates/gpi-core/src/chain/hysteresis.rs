@@ -3,6 +3,7 @@
 use crate::effects::{Block, Moment};
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading, play};
 use crate::{Hysteresis, Matrix};
+use std::ops::Range;
 
 /// Parameters of one hysteresis: `z = sum_j g_j Z_{eta_j}(u)`, then plays.
 ///
@@ -200,6 +201,34 @@ pub(crate) struct Derivatives {
     pub starts: bool,
 }
 
+/// Where [`Sensitivity::step`] writes what: v first, then its derivatives by each group.
+#[derive(Clone, Debug)]
+pub(crate) struct Columns {
+    pub weights: Range<usize>,
+    pub slopes: Range<usize>,
+    pub thresholds: Range<usize>,
+    pub half_widths: Range<usize>,
+    pub starts: Range<usize>,
+    pub len: usize,
+}
+
+impl Columns {
+    pub(crate) fn new(parameters: &Parameters, wanted: Derivatives) -> Self {
+        let (n, zones) = (parameters.half_widths.len(), parameters.thresholds.len());
+        let mut len = 1;
+        let mut take = |count: usize, wanted: bool| {
+            let first = len;
+            len += if wanted { count } else { 0 };
+            first..len
+        };
+        let (weights, slopes) = (take(n, true), take(zones, true));
+        let thresholds = take(zones, wanted.thresholds);
+        let half_widths = take(n, wanted.half_widths);
+        let starts = take(n, wanted.starts);
+        Self { weights, slopes, thresholds, half_widths, starts, len }
+    }
+}
+
 /// Streams v and its derivatives with respect to weights, slopes, thresholds, half-widths and start
 /// values.
 ///
@@ -209,6 +238,7 @@ pub(crate) struct Derivatives {
 pub(crate) struct Sensitivity<'a> {
     parameters: &'a Parameters,
     wanted: Derivatives,
+    columns: Columns,
     beside: Beside<'a>,
     /// Whether plays are read through curves, so that the sums change while they stick.
     curved: bool,
@@ -245,6 +275,7 @@ impl<'a> Sensitivity<'a> {
         Self {
             parameters,
             wanted,
+            columns: Columns::new(parameters, wanted),
             curved: beside.blocks.iter().any(|playing| playing.block.reads()),
             beside,
             previous: None,
@@ -257,18 +288,6 @@ impl<'a> Sensitivity<'a> {
             present: vec![0.0; zones],
             sums: vec![0.0; zones],
         }
-    }
-
-    /// How many values [`Sensitivity::step`] writes: v, weights, slopes, thresholds, half-widths,
-    /// starts.
-    pub(crate) fn columns(parameters: &Parameters, wanted: Derivatives) -> usize {
-        let (n, zones) = (parameters.half_widths.len(), parameters.thresholds.len());
-        let times = |count: usize, wanted: bool| if wanted { count } else { 0 };
-        1 + n
-            + zones
-            + times(zones, wanted.thresholds)
-            + times(n, wanted.half_widths)
-            + times(n, wanted.starts)
     }
 
     /// One sample: `v`, then dv/d of the weights, slopes, thresholds, half-widths and start values.
@@ -293,8 +312,7 @@ impl<'a> Sensitivity<'a> {
             self.stand(z, start);
         }
         let held_size = self.present.len();
-        let widths = 1 + n + held_size;
-        let starts = widths + if self.wanted.half_widths { n } else { 0 };
+        let (widths, starts) = (self.columns.half_widths.start, self.columns.starts.start);
         let mut v = 0.0;
         for i in 0..n {
             let previous = self.plays[i];
@@ -332,7 +350,7 @@ impl<'a> Sensitivity<'a> {
             self.sum_through_curves();
         }
         output[0] = v;
-        output[1 + n..widths].copy_from_slice(&self.sums);
+        output[self.columns.slopes.start..widths].copy_from_slice(&self.sums);
     }
 
     /// The sums anew, with the slopes of the curves at the plays' present places.
@@ -369,7 +387,7 @@ mod tests {
     fn run(parameters: &Parameters, start: &[f64], u: &[f64]) -> Vec<Vec<f64>> {
         let wanted = Derivatives { thresholds: true, half_widths: true, starts: true };
         let mut sensitivity = Sensitivity::new(parameters, Some(start), wanted, Beside::default());
-        let mut row = vec![0.0; Sensitivity::columns(parameters, wanted)];
+        let mut row = vec![0.0; Columns::new(parameters, wanted).len];
         u.iter()
             .map(|&value| {
                 sensitivity.step(value, &mut row);

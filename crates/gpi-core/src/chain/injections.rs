@@ -1,15 +1,19 @@
 //! Where a change of each unknown enters the chain behind the hysteresis.
 
+use super::hysteresis::{Columns, Derivatives};
+use super::point::Point;
+use super::table::{Group, Table};
 use crate::Matrix;
-use crate::chain::hysteresis::{Derivatives, Sensitivity};
-use crate::chain::point::{Layout, Point};
 use crate::effects::{InnerLoop, Law, Sees};
+use crate::linear::Section;
 use std::ops::Range;
 
 /// What was recorded of a block of samples, where in a column of signals.
 pub(crate) struct Signals {
     /// v of each input, then its derivatives.
     pub columns: Vec<Range<usize>>,
+    /// Where in the columns of an input its derivatives stand.
+    pub hysteresis: Vec<Columns>,
     /// Derivatives of v by the values of each effect that reads the plays.
     pub readings: Vec<Range<usize>>,
     pub states: Range<usize>,
@@ -50,13 +54,14 @@ impl Signals {
             len += count;
             len - count..len
         };
-        let sizes = point.channels.iter().map(|c| Sensitivity::columns(c, wanted));
-        let columns = sizes.map(&mut take).collect();
+        let hysteresis: Vec<Columns> =
+            point.channels.iter().map(|channel| Columns::new(channel, wanted)).collect();
+        let columns = hysteresis.iter().map(|own| take(own.len)).collect();
         let reading = point.readers().map(|effect| effect.block().values().len());
         let readings = reading.map(&mut take).collect();
         let states = take(point.dynamics.order());
         let loops = point.loops().map(|inner| take(1 + inner.law.stops())).collect();
-        Self { columns, readings, states, loops, len }
+        Self { columns, hysteresis, readings, states, loops, len }
     }
 }
 
@@ -77,68 +82,29 @@ impl Places {
 }
 
 /// The injections of all unknowns of an experiment, in the order of the unknowns. Those that are added behind the
-/// output stage have none.
+/// output stage have none, nor do initial states, which are no signal.
 pub(crate) fn injections(
     point: &Point,
-    layout: &Layout,
+    table: &Table,
     experiment: usize,
     signals: &Signals,
     places: &Places,
 ) -> Vec<Injection> {
-    let mut gathered = Gathered { found: Vec::new(), signals, places };
-    for (input, columns) in signals.columns.iter().enumerate() {
-        // the order in which the sensitivities are streamed
-        let mut column = columns.start + 1;
-        for unknowns in [
-            &layout.weights[input],
-            &layout.slopes[input],
-            &layout.thresholds[input],
-            &layout.half_widths[input],
-            &layout.plays[experiment][input],
-        ] {
-            for unknown in unknowns.clone() {
-                gathered.add(unknown, places.v.start + input, column, 1.0);
-                column += 1;
-            }
-        }
-        // no unknowns where the start is known, but the columns are there
-        debug_assert!(column <= columns.end);
+    let mut entries = Entries { found: Vec::new(), point, signals, places };
+    for (group, unknowns) in table.rows() {
+        entries.of(group, unknowns, experiment);
     }
-    gathered.add_sections(point, layout);
-    let outputs = point.dynamics.outputs();
-    for (column, unknown) in layout.feedthrough.iter().enumerate() {
-        if let &Some(unknown) = unknown {
-            let v = gathered.v(column / outputs);
-            gathered.add(unknown, places.y.start + column % outputs, v, 1.0);
-        }
-    }
-    let (mut number, mut readings) = (0, signals.readings.iter());
-    for (effect, unknowns) in point.effects.iter().zip(&layout.effects) {
-        if effect.block().reads()
-            && let Some(columns) = readings.next()
-        {
-            for (unknown, column) in unknowns.clone().zip(columns.clone()) {
-                gathered.add(unknown, places.v.start + effect.block().channel(), column, 1.0);
-            }
-        }
-        let mut first = unknowns.start;
-        for inner in effect.block().loops() {
-            first = gathered.add_loop(inner, number, first);
-            number += 1;
-        }
-    }
-    let mut found = gathered.found;
-    found.sort_by_key(|injection| injection.unknown);
-    found
+    entries.found
 }
 
-struct Gathered<'a> {
+struct Entries<'a> {
     found: Vec<Injection>,
+    point: &'a Point,
     signals: &'a Signals,
     places: &'a Places,
 }
 
-impl Gathered<'_> {
+impl Entries<'_> {
     fn add(&mut self, unknown: usize, place: usize, signal: usize, factor: f64) {
         self.found.push(Injection { unknown, place, signal, factor });
     }
@@ -148,45 +114,107 @@ impl Gathered<'_> {
         self.signals.columns[input].start
     }
 
-    fn add_sections(&mut self, point: &Point, layout: &Layout) {
-        let outputs = point.dynamics.outputs();
-        let (states, y) = (self.places.states.start, self.places.y.start);
-        let mut first = 0;
-        for (section, unknowns) in point.dynamics.sections.iter().zip(&layout.sections) {
-            let order = section.order();
-            // What the held DC gains take back through D; what stands beside G is no part of them.
-            let held = point.dynamics.held.iter().map(|held| held.0).enumerate();
-            let held: Vec<(usize, usize)> = held.filter(|_| section.beside.is_none()).collect();
-            let standing = section.standing(&section.b);
-            let gain = &section.c * section.standing(&Matrix::identity(order, order));
-            let x = self.signals.states.start + first;
-            for (j, unknown) in unknowns.a.clone().enumerate() {
-                self.add(unknown, states + first + j, x, -1.0);
-                for &(input, output) in &held {
-                    let still = gain[(output, j)] * standing[(0, input)];
-                    self.add(unknown, y + output, self.v(input), still);
-                }
+    fn of(&mut self, group: Group, unknowns: Range<usize>, experiment: usize) {
+        match group {
+            Group::Weights { input } => self.hysteresis(input, unknowns, |c| &c.weights),
+            Group::Slopes { input } => self.hysteresis(input, unknowns, |c| &c.slopes),
+            Group::Thresholds { input } => self.hysteresis(input, unknowns, |c| &c.thresholds),
+            Group::HalfWidths { input } => self.hysteresis(input, unknowns, |c| &c.half_widths),
+            Group::Plays { experiment: own, input } if own == experiment => {
+                self.hysteresis(input, unknowns, |c| &c.starts);
             }
-            for (place, unknown) in unknowns.b.clone().enumerate() {
-                let (input, j) = (place / order, place % order);
-                self.add(unknown, states + first + j, self.v(input), 1.0);
-                for &(input, output) in held.iter().filter(|held| held.0 == input) {
-                    self.add(unknown, y + output, self.v(input), -gain[(output, j)]);
-                }
+            Group::Denominator { section } => self.denominator(section, unknowns),
+            Group::Numerator { section } => self.numerator(section, unknowns),
+            Group::Observer { section } => self.observer(section, unknowns),
+            Group::Feedthrough { input, output } => {
+                self.add(unknowns.start, self.places.y.start + output, self.v(input), 1.0);
             }
-            for (place, unknown) in unknowns.c.clone().enumerate() {
-                let (output, j) = (place % outputs, place / outputs);
-                self.add(unknown, y + output, x + j, 1.0);
-                for &(input, output) in held.iter().filter(|held| held.1 == output) {
-                    self.add(unknown, y + output, self.v(input), -standing[(j, input)]);
-                }
+            Group::Effect { place } => self.effect(place, unknowns),
+            Group::Plays { .. } | Group::Offsets { .. } | Group::State { .. } => {}
+        }
+    }
+
+    /// The derivatives of v by a group of a hysteresis are signals.
+    fn hysteresis(
+        &mut self,
+        input: usize,
+        unknowns: Range<usize>,
+        own: fn(&Columns) -> &Range<usize>,
+    ) {
+        let first = self.v(input) + own(&self.signals.hysteresis[input]).start;
+        for (unknown, signal) in unknowns.zip(first..) {
+            self.add(unknown, self.places.v.start + input, signal, 1.0);
+        }
+    }
+
+    /// The first state of a section, and what the held DC gains take back through D: input, output, the steady
+    /// states for an input of one (order, inputs), and the DC gains from its states (outputs, order). A section in
+    /// parallel with G is no part of the held gains.
+    fn section(&self, section: usize) -> (usize, Vec<(usize, usize)>, Matrix, Matrix) {
+        let dynamics = &self.point.dynamics;
+        let own = &dynamics.sections[section];
+        let first = dynamics.sections[..section].iter().map(Section::order).sum();
+        let held = dynamics.held.iter().map(|held| held.0).enumerate();
+        let held = held.filter(|_| own.beside.is_none()).collect();
+        let gain = &own.c * own.standing(&Matrix::identity(own.order(), own.order()));
+        (first, held, own.standing(&own.b), gain)
+    }
+
+    fn denominator(&mut self, section: usize, unknowns: Range<usize>) {
+        let (first, held, standing, gain) = self.section(section);
+        let (y, states) = (self.places.y.start, self.places.states.start + first);
+        for (j, unknown) in unknowns.enumerate() {
+            self.add(unknown, states + j, self.signals.states.start + first, -1.0);
+            for &(input, output) in &held {
+                let still = gain[(output, j)] * standing[(0, input)];
+                self.add(unknown, y + output, self.v(input), still);
             }
-            first += order;
+        }
+    }
+
+    fn numerator(&mut self, section: usize, unknowns: Range<usize>) {
+        let (first, held, standing, gain) = self.section(section);
+        let (y, states) = (self.places.y.start, self.places.states.start + first);
+        for (place, unknown) in unknowns.enumerate() {
+            let (input, j) = (place / standing.nrows(), place % standing.nrows());
+            self.add(unknown, states + j, self.v(input), 1.0);
+            for &(input, output) in held.iter().filter(|held| held.0 == input) {
+                self.add(unknown, y + output, self.v(input), -gain[(output, j)]);
+            }
+        }
+    }
+
+    fn observer(&mut self, section: usize, unknowns: Range<usize>) {
+        let (first, held, standing, gain) = self.section(section);
+        let y = self.places.y.start;
+        for (place, unknown) in unknowns.enumerate() {
+            let (output, j) = (place % gain.nrows(), place / gain.nrows());
+            self.add(unknown, y + output, self.signals.states.start + first + j, 1.0);
+            for &(input, output) in held.iter().filter(|held| held.1 == output) {
+                self.add(unknown, y + output, self.v(input), -standing[(j, input)]);
+            }
+        }
+    }
+
+    fn effect(&mut self, place: usize, unknowns: Range<usize>) {
+        let before = &self.point.effects[..place];
+        let block = self.point.effects[place].block();
+        if block.reads() {
+            let number = before.iter().filter(|effect| effect.block().reads()).count();
+            let v = self.places.v.start + block.channel();
+            for (unknown, signal) in unknowns.clone().zip(self.signals.readings[number].clone()) {
+                self.add(unknown, v, signal, 1.0);
+            }
+        }
+        let number: usize = before.iter().map(|effect| effect.block().loops().len()).sum();
+        let mut first = unknowns.start;
+        for (inner, number) in block.loops().iter().zip(number..) {
+            first = self.around(inner, number, first);
         }
     }
 
     /// The values of a loop, in their order from an unknown on; returns the next unknown.
-    fn add_loop(&mut self, inner: &InnerLoop, number: usize, first: usize) -> usize {
+    fn around(&mut self, inner: &InnerLoop, number: usize, first: usize) -> usize {
         let (places, signals) = (self.places, self.signals);
         let own = signals.loops[number].clone();
         let mut unknown = first;

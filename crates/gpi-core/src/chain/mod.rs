@@ -1,6 +1,7 @@
 //! The differentiable signal chain of the estimator.
 
 pub(crate) mod adjoint;
+pub(crate) mod bounds;
 pub(crate) mod free_run;
 pub(crate) mod hysteresis;
 pub(crate) mod injections;
@@ -14,4 +15,5 @@ mod placement;
 pub(crate) mod point;
 mod sensing;
 pub(crate) mod stream;
+pub(crate) mod table;
 pub(crate) mod tangents;

@@ -1,7 +1,8 @@
 //! Plays and deadzones that come and go.
 
+use super::point::Point;
+use super::table::{Group, Table};
 use crate::Matrix;
-use crate::chain::point::{Layout, Point};
 
 impl Point {
     /// The point with one more play, where there is none of its half-width; its past lies between those of
@@ -69,17 +70,49 @@ impl Point {
         dropped
     }
 
+    /// Puts plays without weight at `sides` beside z in turn and, where half-widths may move, spreads
+    /// them over the upper half below `limits` (one an input), where plays forget last; returns how
+    /// many there are.
+    pub(crate) fn put_idle_plays(&mut self, sides: &[f64], limits: Option<&[f64]>) -> usize {
+        let mut moved = 0;
+        for (input, channel) in self.channels.iter_mut().enumerate() {
+            let is_idle = |&i: &usize| i > 0 && channel.weights[i] == 0.0;
+            let idle: Vec<usize> = (0..channel.weights.len()).filter(is_idle).collect();
+            moved += idle.len();
+            for (number, &play) in idle.iter().enumerate() {
+                let place = 0.5 + 0.5 * (number as f64 + 0.5) / idle.len() as f64;
+                if let Some(limits) = limits {
+                    channel.half_widths[play] = place * limits[input];
+                }
+            }
+            let mut order: Vec<usize> = (0..channel.weights.len()).collect();
+            order.sort_by(|&i, &j| channel.half_widths[i].total_cmp(&channel.half_widths[j]));
+            let reorder = |values: &mut Vec<f64>| {
+                *values = order.iter().map(|&place| values[place]).collect();
+            };
+            reorder(&mut channel.half_widths);
+            reorder(&mut channel.weights);
+            for places in self.pasts.iter_mut().filter_map(|past| past.plays.as_mut()) {
+                for (&play, &side) in idle.iter().zip(sides.iter().cycle()) {
+                    places[input][play] = side;
+                }
+                reorder(&mut places[input]);
+            }
+        }
+        moved
+    }
+
     /// Takes the weight from the deadzone, the identity apart, that has the largest share in each
     /// direction that the data do not determine; says whether there was one.
-    pub(crate) fn silence_deadzones(&mut self, layout: &Layout, open: &Matrix) -> bool {
+    pub(crate) fn silence_deadzones(&mut self, table: &Table, open: &Matrix) -> bool {
         /// Where it has a smaller share, the direction is about something else.
         const SHARE: f64 = 0.3;
         let mut silenced = false;
         for direction in open.column_iter() {
             let share = |i: &usize| direction[*i].abs();
-            let zones = layout.slopes.iter().enumerate();
-            let zones = zones.flat_map(|(input, unknowns)| {
-                unknowns.clone().skip(1).zip(1..).map(move |(i, place)| (input, place, i))
+            let zones = (0..self.channels.len()).flat_map(|input| {
+                let unknowns = table.range(Group::Slopes { input });
+                unknowns.skip(1).zip(1..).map(move |(i, place)| (input, place, i))
             });
             let largest = zones.max_by(|a, b| share(&a.2).total_cmp(&share(&b.2)));
             if let Some((input, place, _)) = largest.filter(|(_, _, i)| share(i) > SHARE) {

@@ -1,14 +1,16 @@
 //! One experiment streamed through the hysteresis of every input, through G and the output stage, and
 //! through all of their derivatives.
 
-use crate::chain::hysteresis::{Derivatives, Sensitivity};
-use crate::chain::injections::{ONE, Signals};
-use crate::chain::motion::Motion;
-use crate::chain::point::{Layout, Past, Point};
-use crate::chain::sensing::Sensing;
-use crate::chain::tangents::{Tangents, Trace};
+use super::hysteresis::{Derivatives, Sensitivity};
+use super::injections::{ONE, Signals};
+use super::motion::Motion;
+use super::point::{Past, Point};
+use super::sensing::Sensing;
+use super::table::{Group, Table};
+use super::tangents::{Tangents, Trace};
 use crate::effects::Stage;
 use crate::{Error, Experiment, Matrix};
+use std::ops::Range;
 
 /// Samples that are taken through at once: what is recorded of them stays in the cache.
 const BLOCK: usize = 256;
@@ -24,7 +26,7 @@ pub(crate) struct Rows {
 /// Streams one experiment and hands its rows on block by block.
 pub(crate) struct Stream<'a> {
     point: &'a Point,
-    layout: &'a Layout,
+    table: &'a Table,
     experiment: &'a Experiment,
     index: usize,
     sensitivities: Vec<Sensitivity<'a>>,
@@ -43,6 +45,9 @@ pub(crate) struct Stream<'a> {
     displaced: Matrix,
     /// What effects add to the output, (samples, outputs).
     added: Matrix,
+    /// Where the unknowns of the offsets and of each effect stand.
+    offset_unknowns: usize,
+    effect_unknowns: Vec<Range<usize>>,
     /// The sample from which on derivatives are taken along.
     tangents_from: usize,
 }
@@ -50,7 +55,7 @@ pub(crate) struct Stream<'a> {
 impl<'a> Stream<'a> {
     pub(crate) fn new(
         point: &'a Point,
-        layout: &'a Layout,
+        table: &'a Table,
         wanted: Derivatives,
         experiment: &'a Experiment,
         index: usize,
@@ -74,14 +79,18 @@ impl<'a> Stream<'a> {
             readings: point.reading_slopes(&drive, &point.pasts[index]),
             motion: Motion::new(point),
             sensing: Vec::new(),
-            tangents: Tangents::new(point, layout, signals, experiment, index),
+            tangents: Tangents::new(point, table, signals, experiment, index),
             drive,
             effects: point.effect_columns(experiment, index)?,
             displaced: added(Stage::Displaced),
             added: added(Stage::Added),
+            offset_unknowns: table.range(Group::Offsets { experiment: index }).start,
+            effect_unknowns: (0..point.effects.len())
+                .map(|place| table.range(Group::Effect { place }))
+                .collect(),
             tangents_from: 0,
             point,
-            layout,
+            table,
             experiment,
             index,
         })
@@ -108,7 +117,7 @@ impl<'a> Stream<'a> {
             if trace.samples.end <= self.tangents_from {
                 continue;
             }
-            let mut regressors = vec![Matrix::zeros(self.layout.len, trace.scored.len()); outputs];
+            let mut regressors = vec![Matrix::zeros(self.table.len, trace.scored.len()); outputs];
             self.tangents.run(&trace, &mut regressors);
             if trace.scored.is_empty() {
                 continue;
@@ -155,7 +164,7 @@ impl<'a> Stream<'a> {
         let scored: Vec<usize> =
             block.clone().filter(|&k| is_scored[k]).map(|k| k - first).collect();
         let mut residuals = Matrix::zeros(self.point.dynamics.outputs(), scored.len());
-        let Signals { columns, readings, states, loops, len } = self.tangents.signals();
+        let Signals { columns, readings, states, loops, len, .. } = self.tangents.signals();
         let mut trace = Trace {
             signals: vec![0.0; len * block.len()],
             samples: block,
@@ -228,13 +237,12 @@ impl<'a> Stream<'a> {
     /// Calls `each` with the derivatives of what is added behind the output stage, and by the values of effects
     /// whose own do not stream along.
     pub(crate) fn added(&self, output: usize, k: usize, mut each: impl FnMut(usize, f64)) {
-        let layout = self.layout;
         let knots = self.point.offsets[self.index].nrows();
-        let first = layout.offsets[self.index].start + output * knots;
+        let first = self.offset_unknowns + output * knots;
         for (knot, weight) in hats(k, self.experiment.input.nrows(), knots) {
             each(first + knot, weight);
         }
-        for (columns, unknowns) in self.effects.iter().zip(&layout.effects) {
+        for (columns, unknowns) in self.effects.iter().zip(&self.effect_unknowns) {
             for (column, unknown) in columns.iter().zip(unknowns.clone()) {
                 each(unknown, column[(k, output)]);
             }

@@ -1,8 +1,9 @@
 //! Derivatives by all unknowns, taken through G, its loops and the output stage side by side.
 
-use crate::chain::injections::{Injection, Places, Signals, injections};
-use crate::chain::lanes::{LANES, Lanes, NONE, Weights, add, pass, relax};
-use crate::chain::point::{Layout, Point};
+use super::injections::{Injection, Places, Signals, injections};
+use super::lanes::{LANES, Lanes, NONE, Weights, add, pass, relax};
+use super::point::Point;
+use super::table::{Group, Table};
 use crate::effects::{InnerLoop, Sees, Slope, Stage};
 use crate::linear::Section;
 use crate::{Experiment, Matrix};
@@ -70,20 +71,20 @@ struct Tile {
 impl<'a> Tangents<'a> {
     pub(crate) fn new(
         point: &'a Point,
-        layout: &Layout,
+        table: &Table,
         signals: Signals,
         experiment: &Experiment,
         index: usize,
     ) -> Self {
         let places = Places::new(point);
         let dynamics = &point.dynamics;
-        let mut all = injections(point, layout, index, &signals, &places).into_iter().peekable();
+        let mut all = injections(point, table, index, &signals, &places).into_iter().peekable();
         let loops: Vec<&InnerLoop> = point.loops().collect();
         let plays = loops.iter().map(|inner| inner.law.stops()).sum();
         let sensed = sensed(point);
-        let start = layout.states[index].clone();
+        let start = table.range(Group::State { experiment: index });
         let tile = |first: usize| {
-            let own = first..layout.len.min(first + LANES);
+            let own = first..table.len.min(first + LANES);
             let injections: Vec<Injection> =
                 std::iter::from_fn(|| all.next_if(|one| own.contains(&one.unknown))).collect();
             let starts: Vec<(usize, usize)> = start
@@ -112,7 +113,7 @@ impl<'a> Tangents<'a> {
                 rows: vec![Vec::new(); dynamics.outputs()],
             }
         };
-        let tiles: Vec<Tile> = (0..layout.len).step_by(LANES).map(tile).collect();
+        let tiles: Vec<Tile> = (0..table.len).step_by(LANES).map(tile).collect();
         let (c, b) = by_states(&dynamics.sections, dynamics.outputs(), dynamics.inputs());
         let none = vec![0.0; dynamics.order()];
         let sees = |inner: &&'a InnerLoop| match &inner.sees {

@@ -117,8 +117,8 @@ mod tests {
     use crate::chain::looped::{model, record, run};
     use crate::chain::point::{DynamicsFreedom, Freedom};
     use crate::explain::score::Base;
-    use crate::fit::linearization::Weighting;
     use crate::fit::preparation::Prepared;
+    use crate::optimize::Loss;
 
     fn next(model: &Model) -> Vec<(bool, Vec<f64>)> {
         let record = record(model, vec![run(1.5, 0.0, 100, vec![])]);
@@ -131,8 +131,8 @@ mod tests {
             identity: true,
             dynamics: DynamicsFreedom::Everything,
         };
-        let weighting = Weighting::equal(2);
-        let base = Base::new(&point, &prepared.record, freedom, &weighting).unwrap();
+        let loss = Loss::squares(2);
+        let base = Base::new(&point, &prepared.record, freedom, &loss).unwrap();
         base.situation(|situation| {
             let inputs = |signal: &LoopSignal| signal.inputs.row(0).iter().copied().collect();
             let found = families(situation).into_iter();

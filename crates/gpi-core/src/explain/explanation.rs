@@ -219,7 +219,7 @@ fn describe(
     model: &Model,
 ) -> Result<(), Error> {
     let blocks = point.blocks();
-    let deviations = refinement.effect_deviations()?;
+    let deviations = refinement.bands.effect_deviations()?;
     let certain = noise.iter().map(|effect| (effect.clone(), Vec::new()));
     let mut all: Vec<(Effect, Vec<f64>)> =
         blocks.into_iter().zip(deviations).chain(certain).collect();

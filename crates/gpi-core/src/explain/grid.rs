@@ -2,8 +2,9 @@
 
 use super::projection::{LEFT, Projection};
 use super::score::Base;
+use crate::chain::bounds::range;
 use crate::chain::free_run::Signals;
-use crate::chain::point::{Point, range};
+use crate::chain::point::Point;
 use crate::effects::Stage;
 use crate::fit::preparation::Prepared;
 use crate::fit::refine::RefineOptions;

@@ -167,7 +167,7 @@ fn finish(search: &mut Search, interrupted: bool, progress: Progress) -> Result<
     const COARSER: f64 = 10.0;
     let stage = |options: &RefineOptions, steps: usize| {
         let mut own = settings(&search.prepared, options, steps);
-        own.weighting.outputs.clone_from(&search.options.weighting.outputs);
+        own.loss.scales.clone_from(&search.options.loss.scales);
         own
     };
     let mut options = stage(&search.moving, if interrupted { 1 } else { STEPS });
@@ -186,6 +186,6 @@ fn finish(search: &mut Search, interrupted: bool, progress: Progress) -> Result<
     search.repair()?;
     let refined = Refined { fitted, options, outliers: 0, robust: false };
     let refinement = refined.finish(&search.prepared, progress)?;
-    search.point = refinement.point.clone();
+    search.point = refinement.bands.point.clone();
     Ok(refinement)
 }

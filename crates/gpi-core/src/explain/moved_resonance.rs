@@ -76,7 +76,7 @@ fn resonances(
     let (point, record) = one.alone(base, record)?;
     let options = FitOptions { steps: STEPS, gain: 1e-4, ..options.clone() };
     let fitted = fit(point, &record, &options, "dynamics at each swing", progress)?;
-    let (point, layout) = (fitted.point.clone(), fitted.linearization.layout.clone());
+    let (point, table) = (fitted.point.clone(), fitted.table.clone());
     let refined = Refined { fitted, options, outliers: 0, robust: false };
     let uncertainty = refined.uncertainty(&record, progress)?;
     let rate = record.rate();
@@ -86,7 +86,7 @@ fn resonances(
         sections.map(|section| section.poles()[0].arg().abs() * rate / TAU).collect()
     };
     let deviations = uncertainty
-        .spread(&layout.values(&point), |step| Ok(frequencies(&point.moved(step, &layout))))?;
+        .spread(&table.values(&point), |step| Ok(frequencies(&point.moved(step, &table))))?;
     let own = point.dynamics.own();
     let found = frequencies(&point).into_iter().zip(deviations).zip(&own.sections);
     let resonance = |((frequency, deviation), section): ((f64, f64), &Section)| {

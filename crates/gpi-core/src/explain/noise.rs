@@ -5,7 +5,7 @@ use super::search::Search;
 use super::trial::LEAST;
 use crate::effects::{ColouredNoise, Effect, Outliers};
 use crate::identify::{NoiseFloor, NoiseMethod};
-use crate::uncertainty::noise_model::Colour;
+use crate::uncertainty::noise_model::NoiseModel;
 use crate::{Error, Matrix, Record};
 
 /// What is wrong with the noise, when everything else is explained.
@@ -90,7 +90,7 @@ fn memory(
     /// Fourth moment over the square of the second: 3 for noise of any colour, more for what comes in bursts
     /// as the actuator moves.
     const BURSTS: f64 = 3.8;
-    let colour = Colour::of(residuals, &search.prepared.record);
+    let colour = NoiseModel::of(residuals, &search.prepared.record);
     let filter = &colour.coefficients[output];
     if filter.is_empty() {
         return Ok(None);

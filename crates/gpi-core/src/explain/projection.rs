@@ -3,8 +3,11 @@
 use super::score::Base;
 use crate::chain::free_run::Signals;
 use crate::chain::stream::{Rows, Stream};
+use crate::chain::table::Group;
 use crate::effects::{Candidate, Effect, Stage};
-use crate::fit::linearization::{Linearization, gather};
+use crate::fit::gather::gather;
+use crate::fit::problem::Estimation;
+use crate::optimize::{LeastSquares, Linearization};
 use crate::{Error, Experiment, Matrix};
 use nalgebra::DVector;
 
@@ -30,7 +33,7 @@ impl Base<'_> {
     /// So many columns beside the model's own, projected off its sensitivities. `columns` makes them for an
     /// experiment from the signals and the output, and its place.
     pub(crate) fn project(&self, n: usize, columns: Columns) -> Result<Projection, Error> {
-        let unknowns = self.linearization.layout.len;
+        let unknowns = self.table.len;
         let mut cross = Matrix::zeros(unknowns, n);
         let mut squares = Matrix::zeros(n, n);
         let mut with_residual = DVector::zeros(n);
@@ -41,8 +44,8 @@ impl Base<'_> {
             let places: Vec<usize> = experiment.scored_runs().flatten().collect();
             let mut first = 0;
             let derivatives = self.freedom.derivatives;
-            let layout = &self.linearization.layout;
-            let stream = Stream::new(self.point, layout, derivatives, experiment, index)?;
+            let table = &self.table;
+            let stream = Stream::new(self.point, table, derivatives, experiment, index)?;
             gather(stream, &mut || Ok(()), |Rows { regressors, residuals }| {
                 let count = residuals.ncols();
                 let places = &places[first..first + count];
@@ -51,7 +54,7 @@ impl Base<'_> {
                         columns[column][(places[row], output)]
                     });
                     let residual = residuals.row(output).transpose();
-                    let weights = residual.map(|value| self.weighting.of(output, value).0);
+                    let weights = residual.map(|value| self.loss.of(output, value).0);
                     let mut weighted = own.clone();
                     for mut column in weighted.column_iter_mut() {
                         column.component_mul_assign(&weights);
@@ -74,7 +77,7 @@ impl Base<'_> {
         with_residual: DVector<f64>,
     ) -> Projection {
         let white = self.whitening.tr_mul(cross);
-        let own = self.whitening.tr_mul(&self.linearization.descent());
+        let own = self.whitening.tr_mul(&self.linearization.descent);
         Projection {
             left: squares - white.tr_mul(&white),
             score: with_residual - white.tr_mul(&own),
@@ -96,23 +99,24 @@ impl Base<'_> {
             return Ok(None);
         };
         let mut check = || Ok(());
-        let Linearization { equations, layout, .. } =
-            Linearization::new(&point, self.record, self.freedom, self.weighting, &mut check)?;
-        let inserted = layout.effects[place].clone();
-        let known: Vec<usize> = (0..layout.len).filter(|i| !inserted.contains(i)).collect();
+        let problem = Estimation::new(&point, self.record, self.freedom, self.loss);
+        let Linearization { gram, descent, .. } = problem.linearize(&point, &mut check)?;
+        let table = problem.table;
+        let inserted = table.range(Group::Effect { place });
+        let known: Vec<usize> = (0..table.len).filter(|i| !inserted.contains(i)).collect();
         let (values, steps) = (block.values(), block.steps());
         let moved = |probe: &Effect| {
             let pairs = probe.block().values().into_iter().zip(&values);
             pairs.into_iter().position(|(probe, value)| probe != *value)
         };
         let own: Vec<usize> = candidate.probes.iter().filter_map(moved).collect();
-        let (gram, n) = (&equations.gram, own.len());
+        let n = own.len();
         let unknown = |i: usize| inserted.start + own[i];
         let step = |i: usize| steps[own[i]];
         let cross = Matrix::from_fn(known.len(), n, |i, j| gram[(known[i], unknown(j))] * step(j));
         let squares =
             Matrix::from_fn(n, n, |i, j| gram[(unknown(i), unknown(j))] * step(i) * step(j));
-        let with_residual = DVector::from_fn(n, |i, _| equations.rhs[(unknown(i), 0)] * step(i));
+        let with_residual = DVector::from_fn(n, |i, _| descent[unknown(i)] * step(i));
         Ok(Some(self.projected(&cross, &squares, with_residual)))
     }
 }
@@ -124,8 +128,8 @@ mod tests {
     use crate::chain::looped::{model, record, run};
     use crate::chain::point::{DynamicsFreedom, Freedom};
     use crate::effects::{InnerLoop, Law, Sees, Stiffness};
-    use crate::fit::linearization::Weighting;
     use crate::fit::preparation::Prepared;
+    use crate::optimize::Loss;
 
     #[test]
     fn columns_of_loops_are_their_derivatives() {
@@ -140,8 +144,8 @@ mod tests {
             identity: true,
             dynamics: DynamicsFreedom::Everything,
         };
-        let weighting = Weighting { outputs: vec![1.0, 0.4], turns: vec![f64::INFINITY; 2] };
-        let base = Base::new(&point, &prepared.record, freedom, &weighting).unwrap();
+        let loss = Loss { scales: vec![1.0, 0.4], turns: vec![f64::INFINITY; 2] };
+        let base = Base::new(&point, &prepared.record, freedom, &loss).unwrap();
         let inner = |law| InnerLoop {
             sees: Sees::Mixture { states: vec![0.3, 0.5, -0.2], inputs: vec![0.1, 0.2] },
             law,

@@ -3,7 +3,8 @@
 use super::score::{Base, Score, scores};
 use super::search::Search;
 use crate::Error;
-use crate::chain::point::{Layout, Point};
+use crate::chain::point::Point;
+use crate::chain::table::Table;
 use crate::effects::{Candidate, Entry};
 use crate::fit::representatives::representatives;
 use crate::progress::{Progress, report};
@@ -44,11 +45,11 @@ impl Search<'_> {
         ];
         let Self { prepared, options, .. } = self;
         let record = &prepared.record;
-        let unknowns = Layout::new(point, options.freedom).len;
+        let unknowns = Table::new(point, options.freedom).len;
         let few = representatives(point, record, unknowns);
         let alone = few.map(|few| few.alone(point, record)).transpose()?;
         let (point, record) = alone.as_ref().map_or((point, record), |(p, r)| (p, r));
-        let base = Base::new(point, record, options.freedom, &options.weighting)?;
+        let base = Base::new(point, record, options.freedom, &options.loss)?;
         let values = (record.scored() * record.outputs().len()) as f64;
         let present = |entry: &Entry| point.effects.iter().any(|e| e.name() == entry.name);
         // G of any order takes a delay for itself

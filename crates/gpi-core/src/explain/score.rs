@@ -3,8 +3,10 @@
 use super::projection::{LEFT, Projection};
 use crate::chain::free_run::Signals;
 use crate::chain::point::{Freedom, Point};
+use crate::chain::table::Table;
 use crate::effects::{Candidate, Effect, Situation};
-use crate::fit::linearization::{Linearization, Weighting};
+use crate::fit::problem::Estimation;
+use crate::optimize::{LeastSquares, Linearization, Loss};
 use crate::uncertainty::covariance::descending_eigen;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::DVector;
@@ -53,13 +55,14 @@ pub(crate) struct Base<'a> {
     pub point: &'a Point,
     pub record: &'a Record,
     pub freedom: Freedom,
-    pub weighting: &'a Weighting,
+    pub loss: &'a Loss,
     pub signals: Vec<Signals>,
     pub residuals: Vec<Matrix>,
     /// Scaled eigenvectors of the Gram matrix of what is free, over the roots of their eigenvalues:
     /// `W W^T` is its inverse.
     pub(super) whitening: Matrix,
     pub(super) linearization: Linearization,
+    pub(super) table: Table,
 }
 
 impl<'a> Base<'a> {
@@ -67,16 +70,15 @@ impl<'a> Base<'a> {
         point: &'a Point,
         record: &'a Record,
         freedom: Freedom,
-        weighting: &'a Weighting,
+        loss: &'a Loss,
     ) -> Result<Self, Error> {
         /// Directions with less power than this cannot be told from rounding.
         const RANK: f64 = 1e-11;
-        let linearization = Linearization::new(point, record, freedom, weighting, &mut || Ok(()))?;
-        let layout = &linearization.layout;
-        let bounds = point.bounds(layout, record, freedom);
-        let free: Vec<usize> =
-            (0..layout.len).filter(|&i| bounds.lower[i] < 0.0 && bounds.upper[i] > 0.0).collect();
-        let gram = &linearization.equations.gram;
+        let problem = Estimation::new(point, record, freedom, loss);
+        let linearization = problem.linearize(point, &mut || Ok(()))?;
+        let free = problem.bounds(point).free();
+        let table = problem.table;
+        let gram = &linearization.gram;
         let scale: Vec<f64> =
             free.iter().map(|&i| gram[(i, i)].sqrt().max(f64::MIN_POSITIVE)).collect();
         let scaled = Matrix::from_fn(free.len(), free.len(), |i, j| {
@@ -85,7 +87,7 @@ impl<'a> Base<'a> {
         let (values, vectors) = descending_eigen(scaled);
         let largest = values.iter().copied().fold(0.0, f64::max);
         let rank = values.iter().take_while(|&&value| value > RANK * largest).count();
-        let mut whitening = Matrix::zeros(layout.len, rank);
+        let mut whitening = Matrix::zeros(table.len, rank);
         for (i, &row) in free.iter().enumerate() {
             for column in 0..rank {
                 whitening[(row, column)] =
@@ -101,9 +103,10 @@ impl<'a> Base<'a> {
             point,
             record,
             freedom,
-            weighting,
+            loss,
             whitening,
             linearization,
+            table,
         })
     }
 

@@ -6,7 +6,8 @@ use super::lags::Before;
 use super::ranking::Ranked;
 use super::score::Base;
 use super::trial::{LEAST, Rejected, Trial, is_confirmed};
-use crate::chain::point::{Layout, Point};
+use crate::chain::point::Point;
+use crate::chain::table::Table;
 use crate::effects::{CATALOGUE, Entry};
 use crate::fit::minimize::{FitOptions, fit};
 use crate::fit::preparation::Prepared;
@@ -66,7 +67,7 @@ impl<'a> Search<'a> {
         /// Levenberg-Marquardt steps of a trial.
         const STEPS: usize = 12;
         let mut options = settings(&prepared, &RefineOptions::default(), STEPS);
-        options.weighting.outputs.clone_from(&refined.options.weighting.outputs);
+        options.loss.scales.clone_from(&refined.options.loss.scales);
         options.gain = 1e-5;
         Ok(Self {
             test: super::blocks::complement(&prepared.record)?,
@@ -179,7 +180,7 @@ impl<'a> Search<'a> {
         /// by more.
         const NEAR: f64 = 0.5;
         let record = &self.prepared.record;
-        let unknowns = Layout::new(&self.point, self.options.freedom).len;
+        let unknowns = Table::new(&self.point, self.options.freedom).len;
         if representatives(&self.point, record, unknowns).is_none() {
             return concurrently(ranked, progress, |one, progress| self.trial(one, progress));
         }
@@ -231,20 +232,20 @@ impl<'a> Search<'a> {
     fn floor(&self) -> Result<f64, Error> {
         let record = &self.prepared.record;
         let noise = NoiseFloor::estimate(record, &self.point.residuals(record)?);
-        let weights = &self.options.weighting.outputs;
+        let weights = &self.options.loss.scales;
         let squares = noise.rms.iter().zip(weights).map(|(rms, weight)| (rms * weight).powi(2));
         Ok(squares.sum::<f64>() * record.scored() as f64)
     }
 
     fn base(&self) -> Result<Base<'_>, Error> {
         let Self { point, prepared, options, .. } = self;
-        Base::new(point, &prepared.record, options.freedom, &options.weighting)
+        Base::new(point, &prepared.record, options.freedom, &options.loss)
     }
 
     /// All that is free, grids that were not given included.
     pub(super) fn moving_grids(&self) -> FitOptions {
         let options = settings(&self.prepared, &self.moving, self.options.steps);
-        FitOptions { weighting: self.options.weighting.clone(), gain: 1e-3, ..options }
+        FitOptions { loss: self.options.loss.clone(), gain: 1e-3, ..options }
     }
 
     /// A point fitted with grids that move, plays and deadzones without use left out; and its cost.

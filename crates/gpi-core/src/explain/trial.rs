@@ -4,12 +4,14 @@ use super::ranking::Ranked;
 use super::score::Score;
 use super::search::Search;
 use crate::Progress;
-use crate::chain::point::{Layout, Point};
+use crate::chain::point::Point;
+use crate::chain::table::Table;
 use crate::effects::{Entry, Stage};
-use crate::fit::minimize::{FitOptions, Fitted, Status, fit};
+use crate::fit::minimize::{FitOptions, Fitted, fit};
 use crate::fit::refine::Refined;
 use crate::fit::representatives::representatives;
 use crate::linear::Section;
+use crate::optimize::Status;
 use crate::{Error, Record};
 
 /// An effect that takes a smaller part of the residual's squares is of no use to anyone.
@@ -153,7 +155,7 @@ impl Search<'_> {
     ) -> Result<Trial, Error> {
         let (cost, values) = (fitted.linearization.cost, self.prepared.values());
         let point = fitted.point.clone();
-        let length = |point: &Point| Layout::new(point, self.options.freedom).len;
+        let length = |point: &Point| Table::new(point, self.options.freedom).len;
         let added = length(&point).saturating_sub(length(&self.point));
         /// Candidates that a round looks at: the best of so many must be better than one.
         const LOOKS: f64 = 150.0;
@@ -191,7 +193,7 @@ impl Search<'_> {
     fn squares(&self, point: &Point, scored: &Record) -> Result<Vec<f64>, Error> {
         // run over the training record, whose starts were fitted
         let residuals = point.residuals(&self.prepared.record)?;
-        let weights = &self.options.weighting.outputs;
+        let weights = &self.options.loss.scales;
         let mut sums = Vec::new();
         for (residual, experiment) in residuals.iter().zip(scored.experiments()) {
             for run in experiment.scored_rows(residual) {

@@ -100,7 +100,7 @@ pub(crate) fn next_experiment(
     verdict: Verdict,
     record: &Record,
 ) -> Option<NextExperiment> {
-    let (low, high) = crate::chain::point::range(record, 0);
+    let (low, high) = crate::chain::bounds::range(record, 0);
     let rate = record.rate();
     let duration = 600.0_f64.min(1e6 / rate);
     let command = |kind: &str| {

@@ -1,11 +1,10 @@
 //! Where the record shows nothing of the envelope, it does not fall.
 
-use crate::Progress;
 use crate::chain::hysteresis::Parameters;
-use crate::fit::minimize::{FitOptions, Fitted, fit};
 use crate::fit::preparation::Prepared;
 use crate::fit::refine::Refined;
 use crate::operators::Reading;
+use crate::progress::{Progress, report};
 use crate::{Error, Record};
 
 impl Refined {
@@ -25,12 +24,11 @@ impl Refined {
         if !any {
             return Ok(());
         }
-        let options = FitOptions { steps: 0, ..self.options.clone() };
-        let same = fit(point, &prepared.record, &options, "refinement", progress)?;
+        let mut check = || report(progress, "refinement", 1.0);
+        let same = self.fitted.at(point, &prepared.record, &self.options, &mut check)?;
         // effects before the hysteresis may take u where no sample of the record is
         if same.linearization.cost <= (1.0 + ROUNDING) * self.fitted.linearization.cost {
-            let (status, history) = (self.fitted.status, self.fitted.history.clone());
-            self.fitted = Fitted { status, history, ..same };
+            self.fitted = same;
         }
         Ok(())
     }

@@ -1,13 +1,15 @@
 //! The hysteresis fitted behind given dynamics.
 
 use crate::Progress;
+use crate::chain::bounds::range;
 use crate::chain::hysteresis::{Derivatives, Parameters};
-use crate::chain::point::{DynamicsFreedom, Freedom, Past, Point, range};
+use crate::chain::point::{DynamicsFreedom, Freedom, Past, Point};
 use crate::fit::Grid;
-use crate::fit::linearization::Weighting;
-use crate::fit::minimize::{FitOptions, Status, fit};
+use crate::fit::minimize::{FitOptions, fit};
 use crate::linear::Sections;
 use crate::operators::Reading;
+use crate::optimize::Loss;
+use crate::optimize::Status;
 use crate::{Channel, Error, Experiment, Hysteresis, Matrix, Record};
 use nalgebra::DVector;
 
@@ -114,7 +116,7 @@ pub fn fit_hysteresis(
         identity: false,
         dynamics: DynamicsFreedom::Nothing,
     };
-    let options = FitOptions { freedom, weighting: Weighting::equal(1), steps: 60, gain: 1e-4 };
+    let options = FitOptions { freedom, loss: Loss::squares(1), steps: 60, gain: 1e-4 };
     let fitted = fit(point, &record, &options, "hysteresis", progress)?;
     let channel = &fitted.point.channels[0];
     let z = channel.envelope(0.0, u[0]);

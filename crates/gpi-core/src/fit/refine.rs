@@ -1,13 +1,17 @@
 //! Joint refinement of all parts of a model.
 
 use crate::chain::hysteresis::{Derivatives, Parameters};
-use crate::chain::point::{DynamicsFreedom, Freedom, Layout, Point};
-use crate::fit::linearization::Weighting;
-use crate::fit::minimize::{FitOptions, Fitted, Status, fit};
+use crate::chain::point::{DynamicsFreedom, Freedom, Point};
+use crate::chain::table::Table;
+use crate::fit::certainty;
+use crate::fit::minimize::{FitOptions, Fitted, fit};
 use crate::fit::preparation::Prepared;
 use crate::fit::representatives::representatives;
 use crate::fit::sensitivities::names_and_values;
+use crate::optimize::Loss;
+use crate::optimize::Status;
 use crate::progress::{Progress, report};
+use crate::uncertainty::Bands;
 use crate::uncertainty::covariance::Uncertainty;
 use crate::uncertainty::noise_floor::NoiseFloor;
 use crate::uncertainty::outliers;
@@ -64,9 +68,8 @@ pub struct Refinement {
     pub outliers: usize,
     /// Whether Huber's loss was used.
     pub robust: bool,
-    pub(crate) point: Point,
-    pub(crate) layout: Layout,
-    pub(crate) uncertainty: Uncertainty,
+    /// Standard deviations of whatever follows from the parameters.
+    pub bands: Bands,
 }
 
 /// A refined point, before its uncertainty is worked out.
@@ -132,7 +135,7 @@ pub fn refine(
     }
     let refined = joint(point, &prepared, options, f64::INFINITY, false, progress)?;
     let refinement = refined.finish(&prepared, progress)?;
-    Ok((refinement.point.to_model(record, &prepared.record, &prepared.means)?, refinement))
+    Ok((refinement.bands.point.to_model(record, &prepared.record, &prepared.means)?, refinement))
 }
 
 pub(crate) fn require_match(model: &Model, record: &Record) -> Result<(), Error> {
@@ -157,7 +160,7 @@ pub(crate) fn settings(prepared: &Prepared, options: &RefineOptions, steps: usiz
     let dynamics = DynamicsFreedom::Everything;
     FitOptions {
         freedom: Freedom { weights: true, derivatives, identity: true, dynamics },
-        weighting: Weighting::equal(prepared.means.len()),
+        loss: Loss::squares(prepared.means.len()),
         steps,
         // a tenth of what one more parameter of no use gains by chance
         gain: (0.1 / prepared.values()).clamp(1e-9, 1e-4),
@@ -193,7 +196,7 @@ pub(crate) fn joint(
         *offsets = Matrix::from_fn(options.offset_knots.max(1), first.len(), |_, o| first[o]);
     }
     let mut settings = settings(prepared, options, *STEPS.end());
-    let needed = Layout::new(&point, settings.freedom).len;
+    let needed = Table::new(&point, settings.freedom).len;
     let products = prepared.values() * (needed * needed) as f64;
     settings.steps = ((PRODUCTS / products) as usize).clamp(*STEPS.start(), *STEPS.end());
     if quick {
@@ -208,7 +211,7 @@ pub(crate) fn joint(
     }
     if prepared.means.len() > 1 {
         let deviations = outliers::deviations(&point.residuals(record)?, record);
-        settings.weighting.outputs = balance(&deviations);
+        settings.loss.scales = balance(&deviations);
     }
     let mut history = Vec::new();
     if hopeless.is_finite() {
@@ -237,8 +240,7 @@ pub(crate) fn joint(
             // 95 % of the efficiency of least squares on Gaussian noise
             const TURN: f64 = 1.345;
             let deviations = outliers::deviations(&fitted.point.residuals(record)?, record);
-            settings.weighting.turns =
-                deviations.iter().map(|deviation| TURN * deviation).collect();
+            settings.loss.turns = deviations.iter().map(|deviation| TURN * deviation).collect();
             let again = fit(fitted.point, record, &settings, "refinement", progress)?;
             fitted = again.after(&fitted.history);
         }
@@ -295,7 +297,7 @@ impl Refined {
     ) -> Result<Uncertainty, Error> {
         let residuals = self.fitted.point.residuals(record)?;
         let mut check = || report(progress, "uncertainty", 0.0);
-        Uncertainty::new(&self.fitted, record, &self.options, residuals, &mut check)
+        certainty::uncertainty(&self.fitted, record, &self.options, residuals, &mut check)
     }
 
     /// Drops plays and deadzones without weight and fits once more.
@@ -323,8 +325,8 @@ impl Refined {
         for _ in 0..PASSES {
             let open = self.uncertainty(&prepared.record, progress)?.open;
             let mut simpler = self.clone();
-            let layout = &self.fitted.linearization.layout;
-            if !simpler.fitted.point.silence_deadzones(layout, &open) {
+            let table = &self.fitted.table;
+            if !simpler.fitted.point.silence_deadzones(table, &open) {
                 break;
             }
             simpler.drop_unused(prepared, progress)?;
@@ -349,11 +351,10 @@ impl Refined {
         self.bridge(prepared, progress)?;
         self.drop_unused(prepared, progress)?;
         let uncertainty = self.uncertainty(record, progress)?;
-        let Fitted { point, linearization, history, .. } = self.fitted;
+        let Fitted { point, table, history, .. } = self.fitted;
         let residuals = point.residuals(record)?;
-        let layout = linearization.layout;
-        let estimated = point.estimated(&layout, record, self.options.freedom);
-        let (names, values_of) = names_and_values(&point, &layout, prepared);
+        let estimated = point.bounds(&table, record, self.options.freedom).estimated();
+        let (names, values_of) = names_and_values(&point, &table, prepared);
         let deviations = uncertainty.deviations();
         let parameter = |&i: &usize| Parameter {
             name: names[i].clone(),
@@ -383,9 +384,7 @@ impl Refined {
             residuals,
             outliers: self.outliers,
             robust: self.robust,
-            point,
-            layout,
-            uncertainty,
+            bands: Bands { point, table, uncertainty },
         })
     }
 }

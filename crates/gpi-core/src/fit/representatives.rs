@@ -1,6 +1,7 @@
 //! Parts of a few experiments that stand for all where the derivatives of a whole record would take long.
 
-use crate::chain::point::{Layout, Point};
+use crate::chain::point::Point;
+use crate::chain::table::{Group, Table};
 use crate::{Error, Experiment, Matrix, Record};
 
 /// Chosen experiments, and how much of the record they are.
@@ -92,14 +93,15 @@ fn spread(values: &[f64], count: usize) -> Vec<usize> {
 impl Representatives {
     /// Makes a Gram matrix of these parts that of the record: all unknowns but the offsets, which every
     /// experiment has for itself, have so much more to say.
-    pub(crate) fn extend(&self, gram: &mut Matrix, layout: &Layout, record: &Record) {
+    pub(crate) fn extend(&self, gram: &mut Matrix, table: &Table, record: &Record) {
         let scored = |index: usize| record.experiments()[index].scored() as f64;
-        let mut factors = vec![self.ratio; layout.len];
-        let mut is_own = vec![false; layout.len];
-        layout.offsets.iter().for_each(|own| is_own[own.clone()].fill(true));
+        let mut factors = vec![self.ratio; table.len];
+        let mut is_own = vec![false; table.len];
+        let offsets = |experiment: usize| table.range(Group::Offsets { experiment });
+        (0..record.experiments().len()).for_each(|index| is_own[offsets(index)].fill(true));
         for (index, part) in &self.experiments {
             let whole = scored(*index) / part.scored() as f64;
-            factors[layout.offsets[*index].clone()].fill(whole);
+            factors[offsets(*index)].fill(whole);
         }
         for (j, mut column) in gram.column_iter_mut().enumerate() {
             for (i, value) in column.iter_mut().enumerate() {
@@ -108,11 +110,11 @@ impl Representatives {
         }
         // offsets elsewhere are as well determined as here
         let like = self.experiments[0].0;
-        let known = layout.offsets[like].clone();
+        let known = offsets(like);
         let known = gram.view((known.start, known.start), (known.len(), known.len())).into_owned();
         let is_chosen = |index: &usize| self.experiments.iter().any(|(own, _)| own == index);
         for index in (0..record.experiments().len()).filter(|index| !is_chosen(index)) {
-            let own = layout.offsets[index].clone();
+            let own = offsets(index);
             let mut block = gram.view_mut((own.start, own.start), (own.len(), own.len()));
             block.copy_from(&(&known * (scored(index) / scored(like))));
         }
@@ -136,8 +138,9 @@ mod tests {
     use crate::chain::hysteresis::{Derivatives, Parameters};
     use crate::chain::looped::{model, record, run};
     use crate::chain::point::{DynamicsFreedom, Freedom};
-    use crate::fit::linearization::{Linearization, Weighting};
     use crate::fit::preparation::Prepared;
+    use crate::fit::problem::Estimation;
+    use crate::optimize::{LeastSquares, Loss};
 
     const FREEDOM: Freedom = Freedom {
         weights: true,
@@ -146,10 +149,11 @@ mod tests {
         dynamics: DynamicsFreedom::Everything,
     };
 
-    fn gram(point: &Point, record: &Record) -> (Matrix, Layout) {
-        let weighting = Weighting::equal(2);
-        let all = Linearization::new(point, record, FREEDOM, &weighting, &mut || Ok(())).unwrap();
-        (all.equations.gram, all.layout)
+    fn gram(point: &Point, record: &Record) -> (Matrix, Table) {
+        let loss = Loss::squares(2);
+        let problem = Estimation::new(point, record, FREEDOM, &loss);
+        let all = problem.linearize(point, &mut || Ok(())).unwrap();
+        (all.gram, problem.table)
     }
 
     #[test]
@@ -161,27 +165,28 @@ mod tests {
         let point = prepared.point_of(&model).unwrap();
         let whole = |index: usize| (index, prepared.record.experiments()[index].clone());
         let few = Representatives { experiments: vec![whole(1), whole(3)], ratio: 2.5, memory: 0 };
-        let (expected, layout) = gram(&point, &prepared.record);
+        let (expected, table) = gram(&point, &prepared.record);
         let (alone, own) = few.alone(&point, &prepared.record).unwrap();
         let (two, within) = gram(&alone, &own);
         // offsets of the two stand elsewhere among those of all
-        let shared = within.offsets[0].start;
-        let mut found = Matrix::zeros(layout.len, layout.len);
+        let offsets = |experiment: usize| table.range(Group::Offsets { experiment });
+        let shared = within.range(Group::Offsets { experiment: 0 }).start;
+        let mut found = Matrix::zeros(table.len, table.len);
         let place = |i: usize| match i.checked_sub(shared) {
             None => i,
-            Some(k) => layout.offsets[few.experiments[k / 2].0].start + k % 2,
+            Some(k) => offsets(few.experiments[k / 2].0).start + k % 2,
         };
         for i in 0..within.len {
             for j in 0..within.len {
                 found[(place(i), place(j))] = two[(i, j)];
             }
         }
-        few.extend(&mut found, &layout, &prepared.record);
+        few.extend(&mut found, &table, &prepared.record);
         let scale = expected.amax();
-        let is_offset = |i: usize| layout.offsets.iter().any(|own| own.contains(&i));
+        let is_offset = |i: usize| (0..5).any(|index| offsets(index).contains(&i));
         let same = |i: usize, j: usize| (found[(i, j)] - expected[(i, j)]).abs() < 1e-12 * scale;
-        for i in 0..layout.len {
-            for j in 0..layout.len {
+        for i in 0..table.len {
+            for j in 0..table.len {
                 let other = is_offset(i) != is_offset(j);
                 assert!(other || same(i, j), "{i} {j}: {} {}", found[(i, j)], expected[(i, j)]);
             }

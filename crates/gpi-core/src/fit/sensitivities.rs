@@ -1,11 +1,13 @@
 //! The derivatives that a refinement uses, handed out: for experiment design, other optimizers, checks.
 
 use crate::chain::hysteresis::Parameters;
-use crate::chain::point::{Layout, Point};
+use crate::chain::point::Point;
 use crate::chain::stream::Stream;
-use crate::fit::linearization::{Linearization, Weighting};
+use crate::chain::table::{Group, Table};
 use crate::fit::preparation::Prepared;
+use crate::fit::problem::Estimation;
 use crate::fit::refine::{RefineOptions, require_match, settings};
+use crate::optimize::{LeastSquares, Loss};
 use crate::progress::{Progress, report};
 use crate::{Error, Matrix, Model, Record};
 use nalgebra::DVector;
@@ -52,14 +54,14 @@ pub fn sensitivities(
         }
     }
     let freedom = settings(&prepared, options, 1).freedom;
-    let layout = Layout::new(&point, freedom);
-    let kept = point.estimated(&layout, &prepared.record, freedom);
+    let table = Table::new(&point, freedom);
+    let kept = point.bounds(&table, &prepared.record, freedom).estimated();
     let mut jacobians = Vec::new();
     for (index, experiment) in prepared.record.experiments().iter().enumerate() {
         let samples = experiment.scored();
         let mut own = vec![Matrix::zeros(samples, kept.len()); prepared.means.len()];
         let mut first = 0;
-        Stream::new(&point, &layout, freedom.derivatives, experiment, index)?.run(&mut |rows| {
+        Stream::new(&point, &table, freedom.derivatives, experiment, index)?.run(&mut |rows| {
             report(progress, "sensitivities", 0.0)?;
             for (jacobian, regressor) in own.iter_mut().zip(rows.regressors) {
                 for (column, &i) in kept.iter().enumerate() {
@@ -72,16 +74,17 @@ pub fn sensitivities(
         })?;
         jacobians.push(own);
     }
-    let weighting = Weighting::equal(prepared.means.len());
+    let loss = Loss::squares(prepared.means.len());
     let mut check = || report(progress, "sensitivities", 1.0);
-    let found = Linearization::new(&point, &prepared.record, freedom, &weighting, &mut check)?;
-    let (names, values) = names_and_values(&point, &layout, &prepared);
-    let gram = &found.equations.gram;
+    let problem = Estimation::new(&point, &prepared.record, freedom, &loss);
+    let found = problem.linearize(&point, &mut check)?;
+    let (names, values) = names_and_values(&point, &table, &prepared);
+    let gram = &found.gram;
     Ok(Sensitivities {
         names: kept.iter().map(|&i| names[i].clone()).collect(),
         values: kept.iter().map(|&i| values[i]).collect(),
         jacobians,
-        gradient: DVector::from_fn(kept.len(), |i, _| -found.equations.rhs[kept[i]]),
+        gradient: DVector::from_fn(kept.len(), |i, _| -found.descent[kept[i]]),
         hessian: Matrix::from_fn(kept.len(), kept.len(), |i, j| gram[(kept[i], kept[j])]),
         cost: found.cost,
     })
@@ -90,15 +93,16 @@ pub fn sensitivities(
 /// Names and values of all unknowns, offsets with the means that were taken from the outputs.
 pub(crate) fn names_and_values(
     point: &Point,
-    layout: &Layout,
+    table: &Table,
     prepared: &Prepared,
 ) -> (Vec<String>, Vec<f64>) {
-    let mut values = layout.values(point);
-    for unknowns in &layout.offsets {
+    let mut values = table.values(point);
+    for experiment in 0..point.offsets.len() {
+        let unknowns = table.range(Group::Offsets { experiment });
         let knots = unknowns.len() / prepared.means.len();
         for (place, i) in unknowns.clone().enumerate() {
             values[i] += prepared.means[place / knots];
         }
     }
-    (layout.names(point, &prepared.record), values)
+    (table.names(point, &prepared.record), values)
 }

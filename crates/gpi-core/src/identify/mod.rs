@@ -20,7 +20,7 @@ pub use crate::fit::{
     fit_hysteresis, refine, residuals_from_fitted_start, sensitivities,
 };
 pub use crate::progress::Progress;
-pub use crate::uncertainty::{NoiseFloor, NoiseMethod, PoleDeviations, ResponseDeviation};
+pub use crate::uncertainty::{Bands, NoiseFloor, NoiseMethod, PoleDeviations, ResponseDeviation};
 pub use identification::{Identification, IdentifyOptions, Round};
 pub use procedure::identify;
 pub use structure::Candidate;

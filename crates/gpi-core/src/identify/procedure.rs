@@ -1,7 +1,7 @@
 //! The whole chain: excitation, start, rounds, model.
 
+use crate::chain::bounds::range;
 use crate::chain::hysteresis::Parameters;
-use crate::chain::point::range;
 use crate::fit::Grid;
 use crate::fit::preparation::Prepared;
 use crate::fit::refine::Refined;
@@ -170,7 +170,7 @@ fn finish(
     refined.drop_undetermined(prepared, progress)?;
     let refinement = refined.finish(prepared, progress)?;
     let mut notes = prepared.notes.clone();
-    let dynamics = &refinement.point.dynamics;
+    let dynamics = &refinement.bands.point.dynamics;
     if quasi_static && supported_taps <= 4 {
         let lag = if dynamics.order() > 0 { " and a lag" } else { "" };
         notes.push(format!(
@@ -180,7 +180,11 @@ fn finish(
         ));
     }
     Ok(Identification {
-        model: refinement.point.to_model(prepared.given, &prepared.record, &prepared.means)?,
+        model: refinement.bands.point.to_model(
+            prepared.given,
+            &prepared.record,
+            &prepared.means,
+        )?,
         candidates,
         chosen,
         fir,

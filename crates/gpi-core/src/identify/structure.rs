@@ -1,8 +1,9 @@
 //! The structure from the data: how many plays and deadzones, which order and delay.
 
 use crate::Progress;
+use crate::chain::bounds::range;
 use crate::chain::hysteresis::Parameters;
-use crate::chain::point::{DynamicsFreedom, Point, range};
+use crate::chain::point::{DynamicsFreedom, Point};
 use crate::effects::longest_lag;
 use crate::fit::Grid;
 use crate::fit::memory::Memory;

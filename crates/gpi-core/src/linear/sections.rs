@@ -84,6 +84,23 @@ impl Section {
         }
     }
 
+    /// Adds a change of a, or as much of it as keeps the section stable.
+    pub(crate) fn move_poles(&mut self, change: &[f64]) {
+        /// Smallest part of the change that is tried; below, the section stays as it is.
+        const LEAST: f64 = 1e-6;
+        let before = self.a.clone();
+        let mut fraction = 1.0;
+        while fraction >= LEAST {
+            let values = self.a.iter_mut().zip(&before).zip(change);
+            values.for_each(|((a, before), change)| *a = before + fraction * change);
+            if self.is_stable() {
+                return;
+            }
+            fraction *= 0.5;
+        }
+        self.a = before;
+    }
+
     pub(crate) fn poles(&self) -> Vec<Complex64> {
         match self.a[..] {
             [a1, a2] => {

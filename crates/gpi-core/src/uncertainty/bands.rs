@@ -1,8 +1,9 @@
 //! Standard deviations of what engineers look at: poles, Markov parameters, frequency response, loop.
 
-use crate::chain::point::Point;
+use super::covariance::Uncertainty;
+use crate::chain::point::{Past, Point};
+use crate::chain::table::Table;
 use crate::effects::{Effect, Units};
-use crate::fit::refine::Refinement;
 use crate::linear::Sections;
 use crate::{Error, Matrix};
 use nalgebra::{DMatrix, DVector};
@@ -29,7 +30,15 @@ pub struct ResponseDeviation {
     pub phase: Matrix,
 }
 
-impl Refinement {
+/// An estimate and its covariance, from which the standard deviation of every function of the estimate follows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bands {
+    pub(crate) point: Point,
+    pub(crate) table: Table,
+    pub(crate) uncertainty: Uncertainty,
+}
+
+impl Bands {
     /// Numbers of outputs and inputs.
     pub fn shape(&self) -> (usize, usize) {
         self.point.dynamics.d.shape()
@@ -40,8 +49,8 @@ impl Refinement {
         &self,
         function: impl Fn(&Point) -> Result<Vec<f64>, Error>,
     ) -> Result<Vec<f64>, Error> {
-        let values = self.layout.values(&self.point);
-        let moved = |step: &DVector<f64>| function(&self.point.moved(step, &self.layout));
+        let values = self.table.values(&self.point);
+        let moved = |step: &DVector<f64>| function(&self.point.moved(step, &self.table));
         self.uncertainty.spread(&values, moved)
     }
 
@@ -144,8 +153,7 @@ impl Refinement {
     pub fn loop_deviations(&self, input: &Matrix) -> Result<Matrix, Error> {
         let inputs = self.point.channels.len();
         Error::require_equal("channels", ("input", input.ncols()), ("model", inputs))?;
-        let rest =
-            crate::chain::point::Past { plays: None, moving: false, state: DVector::zeros(0) };
+        let rest = Past { plays: None, moving: false, state: DVector::zeros(0) };
         let deviations =
             self.spread(|point| Ok(point.intermediate(input, &rest).as_slice().to_vec()))?;
         Ok(Matrix::from_column_slice(input.nrows(), inputs, &deviations))

@@ -1,17 +1,11 @@
 //! How far the estimates may be from the truth: the covariance of a least squares fit under coloured
 //! noise.
 
-use crate::chain::point::{Bounds, Freedom, Layout, Point};
-use crate::chain::stream::Stream;
-use crate::fit::linearization::{Weighting, gather};
-use crate::fit::minimize::{FitOptions, Fitted};
-use crate::fit::representatives::{representatives, streamed};
-use crate::linear::{NormalEquations, symmetric_eigen};
-use crate::uncertainty::noise_model::Colour;
-use crate::{Error, Matrix, Record};
+use crate::linear::symmetric_eigen;
+use crate::{Error, Matrix};
 use nalgebra::DVector;
 
-/// Covariance of the unknowns of a [`Layout`].
+/// Covariance of the unknowns of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Uncertainty {
     /// (unknowns, unknowns); zero for those that are held.
@@ -30,34 +24,21 @@ pub(crate) struct Uncertainty {
 const IDENTIFIABLE: f64 = 1e-12;
 
 impl Uncertainty {
-    /// `H^-1 M H^-1` with H the Gram matrix of the sensitivities and M that of the score under the
-    /// residual's colour: with R the autocovariance of an autoregression 1 / a(q), `J^T R J` is the
-    /// Gram matrix of the sensitivities filtered by 1 / a(q).
+    /// `H^-1 M H^-1`, H the Gram matrix `gram` of the sensitivities and M that of the score under the residual's
+    /// autocorrelation, `scores`, for the unknowns `free`; all others are held. `cost` is the sum of the losses of
+    /// so many `samples`.
     pub(crate) fn new(
-        fitted: &Fitted,
-        record: &Record,
-        options: &FitOptions,
-        residuals: Vec<Matrix>,
-        check: &mut dyn FnMut() -> Result<(), Error>,
-    ) -> Result<Self, Error> {
-        let (Fitted { point, linearization, .. }, FitOptions { freedom, weighting, .. }) =
-            (fitted, options);
-        let layout = &linearization.layout;
-        let curvature = weighting.curvature(&residuals, record);
-        let mut weighted = residuals;
-        weighted.iter_mut().for_each(|residual| weighting.apply(residual));
-        let colour = Colour::of(&weighted, record);
-        drop(weighted);
-        let scores = score_gram(point, record, *freedom, weighting, &colour, check)?;
-        let Bounds { lower, upper } = point.bounds(layout, record, *freedom);
-        // A weight at zero is not estimated, it is known to be on its bound.
-        let free: Vec<usize> =
-            (0..layout.len).filter(|&i| lower[i] < 0.0 && upper[i] > 0.0).collect();
+        gram: &Matrix,
+        scores: &Matrix,
+        free: &[usize],
+        samples: f64,
+        cost: f64,
+    ) -> Self {
+        let unknowns = gram.nrows();
         let reduce = |matrix: &Matrix| {
             Matrix::from_fn(free.len(), free.len(), |i, j| matrix[(free[i], free[j])])
         };
-        let gram = reduce(&linearization.equations.gram) * curvature;
-        let scores = reduce(&scores);
+        let (gram, scores) = (reduce(gram), reduce(scores));
         let scale = gram.diagonal().map(|square| if square > 0.0 { square.sqrt() } else { 1.0 });
         let scaled = |m: &Matrix| {
             Matrix::from_fn(free.len(), free.len(), |i, j| m[(i, j)] / (scale[i] * scale[j]))
@@ -70,23 +51,21 @@ impl Uncertainty {
             * Matrix::from_diagonal(&values.rows(0, rank).map(|v| 1.0 / v))
             * known.transpose();
         let scores = scaled(&scores);
-        let samples = (record.scored() * record.outputs().len()) as f64;
-        let used =
-            (&inverse * &scores).trace() * samples / linearization.cost.max(f64::MIN_POSITIVE);
+        let used = (&inverse * &scores).trace() * samples / cost.max(f64::MIN_POSITIVE);
         let reduced = &inverse * scores * &inverse;
-        let mut covariance = Matrix::zeros(layout.len, layout.len);
+        let mut covariance = Matrix::zeros(unknowns, unknowns);
         for (i, &row) in free.iter().enumerate() {
             for (j, &column) in free.iter().enumerate() {
                 covariance[(row, column)] = reduced[(i, j)] / (scale[i] * scale[j]);
             }
         }
-        let mut open = Matrix::zeros(layout.len, free.len() - rank);
+        let mut open = Matrix::zeros(unknowns, free.len() - rank);
         for direction in rank..free.len() {
             for (i, &row) in free.iter().enumerate() {
                 open[(row, direction - rank)] = vectors[(i, direction)];
             }
         }
-        Ok(Self { covariance, open, used, estimated: free.len() })
+        Self { covariance, open, used, estimated: free.len() }
     }
 
     /// Standard deviations of the unknowns; NaN where an undetermined direction takes part.
@@ -157,61 +136,6 @@ impl Uncertainty {
         }
         Ok(variances.into_iter().map(f64::sqrt).collect())
     }
-}
-
-/// The Gram matrix of the sensitivities filtered by 1 / a(q), weighted with the innovations' covariance.
-fn score_gram(
-    point: &Point,
-    record: &Record,
-    freedom: Freedom,
-    weighting: &Weighting,
-    colour: &Colour,
-    check: &mut dyn FnMut() -> Result<(), Error>,
-) -> Result<Matrix, Error> {
-    let layout = Layout::new(point, freedom);
-    let outputs = weighting.outputs.len();
-    // the square root of the innovations' covariance mixes the outputs' filtered rows
-    let (values, vectors) = descending_eigen(colour.innovations.clone());
-    let root = vectors * Matrix::from_diagonal(&values.map(|value| value.max(0.0).sqrt()));
-    let mut equations = NormalEquations::zeros(layout.len, 1);
-    let few = representatives(point, record, layout.len);
-    for (index, experiment, memory) in streamed(few.as_ref(), record) {
-        let stream = Stream::new(point, &layout, freedom.derivatives, experiment, index)?;
-        let mut past: Vec<Matrix> =
-            colour.coefficients.iter().map(|a| Matrix::zeros(layout.len, a.len())).collect();
-        gather(stream.with_memory(memory), check, |rows| {
-            let mut filtered = Vec::new();
-            for (output, regressor) in rows.regressors.iter().enumerate() {
-                let (filter, past) = (&colour.coefficients[output], &mut past[output]);
-                let order = filter.len();
-                let count = regressor.ncols();
-                let mut extended = Matrix::zeros(layout.len, order + count);
-                extended.columns_mut(0, order).copy_from(past);
-                for k in 0..count {
-                    let mut row = regressor.column(k).into_owned();
-                    row *= weighting.outputs[output];
-                    for (lag, &a) in filter.iter().enumerate() {
-                        row.axpy(a, &extended.column(order + k - 1 - lag), 1.0);
-                    }
-                    extended.set_column(order + k, &row);
-                }
-                past.copy_from(&extended.columns(count, order));
-                filtered.push(extended.columns(order, count).into_owned());
-            }
-            let none = Matrix::zeros(1, rows.residuals.ncols());
-            for mixed in 0..outputs {
-                let mut sum = &filtered[0] * root[(0, mixed)];
-                for (output, part) in filtered.iter().enumerate().skip(1) {
-                    sum += part * root[(output, mixed)];
-                }
-                equations.add(&sum, &none);
-            }
-        })?;
-    }
-    if let Some(few) = few {
-        few.extend(&mut equations.gram, &layout, record);
-    }
-    Ok(equations.gram)
 }
 
 /// Eigenvalues (descending) and eigenvectors of a symmetric matrix: of a small one by nalgebra, since faer keeps

@@ -6,5 +6,5 @@ pub(crate) mod noise_floor;
 pub(crate) mod noise_model;
 pub(crate) mod outliers;
 
-pub use bands::{PoleDeviations, ResponseDeviation};
+pub use bands::{Bands, PoleDeviations, ResponseDeviation};
 pub use noise_floor::{NoiseFloor, NoiseMethod};

@@ -5,14 +5,14 @@ use nalgebra::DVector;
 
 /// `e(k) = sum_i a_i e(k-i) + w(k)` for each output, with w white but correlated between outputs.
 #[derive(Clone, Debug)]
-pub(crate) struct Colour {
+pub(crate) struct NoiseModel {
     /// a_1, a_2, .. of each output.
     pub coefficients: Vec<Vec<f64>>,
     /// Covariance of w, (outputs, outputs).
     pub innovations: Matrix,
 }
 
-impl Colour {
+impl NoiseModel {
     /// Fits orders up to 30 by Levinson and Durbin's recursion to the scored samples; each output takes
     /// the order with the least Bayesian information criterion.
     pub(crate) fn of(residuals: &[Matrix], record: &Record) -> Self {
@@ -53,7 +53,7 @@ impl Colour {
     }
 }
 
-impl Colour {
+impl NoiseModel {
     /// Residuals without what their past predicts; the first samples, whose past is not known, are zero.
     pub(crate) fn whiten(&self, residuals: &[Matrix]) -> Vec<Matrix> {
         let whiten = |residual: &Matrix| {

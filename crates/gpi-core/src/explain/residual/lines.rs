@@ -4,7 +4,7 @@ use super::chance::exceeded_with;
 use super::{Beside, ResidualTest};
 use crate::Matrix;
 use crate::spectrum::tapered;
-use crate::uncertainty::noise_model::Colour;
+use crate::uncertainty::noise_model::NoiseModel;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
@@ -25,7 +25,7 @@ pub(super) fn flattened(beside: &Beside) -> Vec<Matrix> {
             }
         }
     }
-    Colour::of(&smooth, beside.record).whiten(beside.residuals)
+    NoiseModel::of(&smooth, beside.record).whiten(beside.residuals)
 }
 
 /// A signal, tapered, with the narrow peaks of its spectrum cut down to what is beside them.

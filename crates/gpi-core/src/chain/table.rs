@@ -1,0 +1,238 @@
+//! The table of the unknowns: one row for each group, from which everything else follows.
+//!
+//! The groups of a [`Point`] stand in one fixed order. A group knows how many values it has, reads them from a point
+//! and writes them back; its bounds ([`super::bounds`]), its names ([`super::names`]) and the places of the chain
+//! where its derivatives enter ([`super::injections`]) are each one `match` over [`Group`]. A step away from a point
+//! is therefore a walk over the rows of the [`Table`].
+
+use super::point::{DynamicsFreedom, Freedom, Point};
+use nalgebra::DVector;
+use std::ops::Range;
+
+/// A group of parameters of a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Group {
+    /// Weights of the plays of an input.
+    Weights {
+        input: usize,
+    },
+    /// Slopes of the deadzones of an input.
+    Slopes {
+        input: usize,
+    },
+    Thresholds {
+        input: usize,
+    },
+    HalfWidths {
+        input: usize,
+    },
+    /// a of a section.
+    Denominator {
+        section: usize,
+    },
+    /// b of a section, (order, inputs) by columns.
+    Numerator {
+        section: usize,
+    },
+    /// c of a section, (outputs, order) by columns. The row of the reference output is held.
+    Observer {
+        section: usize,
+    },
+    /// One element of D.
+    Feedthrough {
+        input: usize,
+        output: usize,
+    },
+    /// The values of an effect; effects that are sections have none here.
+    Effect {
+        place: usize,
+    },
+    /// The additive term of an experiment, (knots, outputs) by columns.
+    Offsets {
+        experiment: usize,
+    },
+    /// Where the plays of an input stood before an experiment.
+    Plays {
+        experiment: usize,
+        input: usize,
+    },
+    /// The initial state of the sections in an experiment.
+    State {
+        experiment: usize,
+    },
+}
+
+use Group::{
+    Denominator, Effect, Feedthrough, HalfWidths, Numerator, Observer, Offsets, Plays, Slopes,
+    State, Thresholds, Weights,
+};
+
+/// The unknowns of a fit: the groups that are free, and where each stands in a step.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Table {
+    rows: Vec<(Group, Range<usize>)>,
+    /// How many unknowns there are.
+    pub len: usize,
+}
+
+impl Table {
+    /// The groups of a point that `freedom` sets free.
+    pub(crate) fn new(point: &Point, freedom: Freedom) -> Self {
+        let mut len = 0;
+        let free = groups(point).into_iter().filter(|group| group.is_free(point, freedom));
+        let row = |group: Group| {
+            let first = len;
+            len += group.read(point).len();
+            (group, first..len)
+        };
+        let rows = free.map(row).collect();
+        Self { rows, len }
+    }
+
+    /// All rows in the order of the unknowns.
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (Group, Range<usize>)> {
+        self.rows.iter().cloned()
+    }
+
+    /// Where a group stands; an empty range if it is held.
+    pub(crate) fn range(&self, group: Group) -> Range<usize> {
+        let found = self.rows.iter().find(|(own, _)| *own == group);
+        found.map_or(0..0, |(_, range)| range.clone())
+    }
+
+    /// The group of an unknown, and the unknown's place within it.
+    pub(crate) fn at(&self, unknown: usize) -> Option<(Group, usize)> {
+        let found = self.rows.iter().find(|(_, range)| range.contains(&unknown));
+        found.map(|(group, range)| (*group, unknown - range.start))
+    }
+
+    /// Whether the output is linear in an unknown while all others are kept.
+    pub(crate) fn is_linear(&self, unknown: usize) -> bool {
+        matches!(self.at(unknown), Some((Weights { .. } | Offsets { .. } | State { .. }, _)))
+    }
+
+    /// The value of every unknown.
+    pub(crate) fn values(&self, point: &Point) -> Vec<f64> {
+        self.rows.iter().flat_map(|(group, _)| group.read(point)).collect()
+    }
+}
+
+/// All groups of a point.
+fn groups(point: &Point) -> Vec<Group> {
+    let (inputs, outputs) = (0..point.channels.len(), 0..point.dynamics.outputs());
+    let experiments = 0..point.pasts.len();
+    let mut all = Vec::new();
+    all.extend(inputs.clone().map(|input| Weights { input }));
+    all.extend(inputs.clone().map(|input| Slopes { input }));
+    all.extend(inputs.clone().map(|input| Thresholds { input }));
+    all.extend(inputs.clone().map(|input| HalfWidths { input }));
+    for section in 0..point.dynamics.sections.len() {
+        all.extend([Denominator { section }, Numerator { section }, Observer { section }]);
+    }
+    for input in inputs.clone() {
+        all.extend(outputs.clone().map(|output| Feedthrough { input, output }));
+    }
+    all.extend((0..point.effects.len()).map(|place| Effect { place }));
+    all.extend(experiments.clone().map(|experiment| Offsets { experiment }));
+    for experiment in experiments.clone() {
+        all.extend(inputs.clone().map(|input| Plays { experiment, input }));
+    }
+    all.extend(experiments.map(|experiment| State { experiment }));
+    all
+}
+
+impl Group {
+    fn is_free(self, point: &Point, freedom: Freedom) -> bool {
+        let Freedom { derivatives, dynamics, .. } = freedom;
+        match self {
+            Weights { .. } | Slopes { .. } | Offsets { .. } => true,
+            Thresholds { .. } => derivatives.thresholds,
+            HalfWidths { .. } => derivatives.half_widths,
+            Denominator { .. } => dynamics == DynamicsFreedom::Everything,
+            Numerator { .. } => dynamics != DynamicsFreedom::Nothing,
+            Observer { .. } => dynamics != DynamicsFreedom::Nothing && point.dynamics.outputs() > 1,
+            // the held DC gain sets one element of each column
+            Feedthrough { input, output } => {
+                dynamics != DynamicsFreedom::Nothing && point.dynamics.held[input].0 != output
+            }
+            Effect { place } => point.effects[place].block().sections(1.0).is_empty(),
+            Plays { experiment, .. } => {
+                derivatives.starts && point.pasts[experiment].plays.is_some()
+            }
+            State { experiment } => derivatives.starts && point.pasts[experiment].moving,
+        }
+    }
+
+    /// The values of the group in a point.
+    pub(crate) fn read(self, point: &Point) -> Vec<f64> {
+        match self {
+            Weights { input } => point.channels[input].weights.clone(),
+            Slopes { input } => point.channels[input].slopes.clone(),
+            Thresholds { input } => point.channels[input].thresholds.clone(),
+            HalfWidths { input } => point.channels[input].half_widths.clone(),
+            Denominator { section } => point.dynamics.sections[section].a.clone(),
+            Numerator { section } => point.dynamics.sections[section].b.as_slice().to_vec(),
+            Observer { section } => point.dynamics.sections[section].c.as_slice().to_vec(),
+            Feedthrough { input, output } => vec![point.dynamics.d[(output, input)]],
+            Effect { place } => point.effects[place].block().values(),
+            Offsets { experiment } => point.offsets[experiment].as_slice().to_vec(),
+            Plays { experiment, input } => {
+                let plays = point.pasts[experiment].plays.as_ref();
+                plays.map_or_else(Vec::new, |plays| plays[input].clone())
+            }
+            State { experiment } => point.pasts[experiment].state.as_slice().to_vec(),
+        }
+    }
+
+    /// Adds a change of the group's values to a point. Weights of plays stay at least zero; a section whose poles
+    /// would leave the unit circle goes as far as they stay inside.
+    fn add(self, point: &mut Point, change: &[f64]) {
+        let add = |values: &mut [f64]| {
+            values.iter_mut().zip(change).for_each(|(value, change)| *value += change);
+        };
+        match self {
+            Weights { input } => {
+                let weights = &mut point.channels[input].weights;
+                add(weights);
+                weights.iter_mut().for_each(|weight| *weight = weight.max(0.0));
+            }
+            Slopes { input } => add(&mut point.channels[input].slopes),
+            Thresholds { input } => add(&mut point.channels[input].thresholds),
+            HalfWidths { input } => add(&mut point.channels[input].half_widths),
+            Denominator { section } => point.dynamics.sections[section].move_poles(change),
+            Numerator { section } => add(point.dynamics.sections[section].b.as_mut_slice()),
+            Observer { section } => add(point.dynamics.sections[section].c.as_mut_slice()),
+            Feedthrough { input, output } => point.dynamics.d[(output, input)] += change[0],
+            Effect { place } => {
+                let mut values = self.read(point);
+                add(&mut values);
+                point.effects[place].block_mut().set(&values);
+            }
+            Offsets { experiment } => add(point.offsets[experiment].as_mut_slice()),
+            Plays { experiment, input } => {
+                let plays = point.pasts[experiment].plays.as_mut();
+                plays.into_iter().for_each(|plays| add(&mut plays[input]));
+            }
+            State { experiment } => add(point.pasts[experiment].state.as_mut_slice()),
+        }
+    }
+
+    /// Whether G depends on the group, so that its held DC gain has to be restored after a step.
+    fn is_dynamics(self) -> bool {
+        matches!(self, Denominator { .. } | Numerator { .. } | Observer { .. } | Feedthrough { .. })
+    }
+}
+
+impl Point {
+    /// The point one step away.
+    pub(crate) fn moved(&self, step: &DVector<f64>, table: &Table) -> Self {
+        let mut moved = self.clone();
+        for (group, range) in table.rows() {
+            group.add(&mut moved, &step.as_slice()[range]);
+        }
+        if table.rows().any(|(group, _)| group.is_dynamics()) {
+            moved.dynamics.hold_gain();
+        }
+        moved
+    }
+}

@@ -1,0 +1,26 @@
+//! Rows of derivatives, gathered while they are streamed.
+
+use crate::Error;
+use crate::chain::stream::{Rows, Stream};
+use std::sync::mpsc::sync_channel;
+
+/// Streams an experiment on this thread and gathers its blocks of rows on another one.
+pub(crate) fn gather(
+    mut stream: Stream,
+    check: &mut dyn FnMut() -> Result<(), Error>,
+    mut add: impl FnMut(Rows) + Send,
+) -> Result<(), Error> {
+    std::thread::scope(|scope| {
+        let (send, receive) = sync_channel::<Rows>(4);
+        let gathering = scope.spawn(move || receive.iter().for_each(&mut add));
+        let streamed = stream.run(&mut |rows| {
+            check()?;
+            // only a panic ends the other thread early, and joining it tells
+            let _ = send.send(rows);
+            Ok(())
+        });
+        drop(send);
+        gathering.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        streamed
+    })
+}

@@ -1,0 +1,169 @@
+//! The estimation of a point on a record, as a least squares problem.
+//!
+//! The residuals are those of the free run, `e = y - y_hat`, of all scored samples and outputs; their derivatives
+//! are streamed through the chain. The memory needed does not grow with samples times unknowns.
+
+use super::gather::gather;
+use super::representatives::{representatives, streamed};
+use crate::chain::adjoint::descent;
+use crate::chain::point::{Freedom, Point};
+use crate::chain::stream::{Rows, Stream};
+use crate::chain::table::Table;
+use crate::linear::NormalEquations;
+use crate::optimize::{Bounds, LeastSquares, Linearization, Loss};
+use crate::{Error, Matrix, Record};
+use nalgebra::{DMatrixView, DVector};
+
+/// What is free of a point, on which record, and how residuals count.
+pub(crate) struct Estimation<'a> {
+    pub record: &'a Record,
+    pub freedom: Freedom,
+    pub loss: &'a Loss,
+    pub table: Table,
+}
+
+impl<'a> Estimation<'a> {
+    /// For points of the structure of `point`.
+    pub(crate) fn new(point: &Point, record: &'a Record, freedom: Freedom, loss: &'a Loss) -> Self {
+        Self { record, freedom, loss, table: Table::new(point, freedom) }
+    }
+}
+
+impl LeastSquares for Estimation<'_> {
+    type Point = Point;
+    type Error = Error;
+
+    fn evaluate(&self, point: &Point) -> Result<f64, Error> {
+        Ok(self.loss.cost(scored(&point.residuals(self.record)?, self.record)))
+    }
+
+    /// Where the derivatives of a whole record would take long, the curvature is that of a few experiments; the
+    /// gradient is always that of the whole record.
+    fn linearize(
+        &self,
+        point: &Point,
+        check: &mut dyn FnMut() -> Result<(), Error>,
+    ) -> Result<Linearization, Error> {
+        let few = representatives(point, self.record, self.table.len);
+        let mut equations = NormalEquations::zeros(self.table.len, 1);
+        let mut cost = 0.0;
+        for (index, experiment, memory) in streamed(few.as_ref(), self.record) {
+            check()?;
+            let wanted = self.freedom.derivatives;
+            let stream = Stream::new(point, &self.table, wanted, experiment, index)?;
+            gather(stream.with_memory(memory), check, |rows| {
+                cost += add(&mut equations, rows, self.loss);
+            })?;
+        }
+        let NormalEquations { mut gram, rhs, .. } = equations;
+        let Some(few) = few else {
+            return Ok(Linearization {
+                gram,
+                descent: rhs.column(0).into_owned(),
+                cost,
+                age: None,
+            });
+        };
+        few.extend(&mut gram, &self.table, self.record);
+        let (descent, cost) = self.gradient(point, check)?;
+        Ok(Linearization { gram, descent, cost, age: Some(0) })
+    }
+
+    fn gradient(
+        &self,
+        point: &Point,
+        check: &mut dyn FnMut() -> Result<(), Error>,
+    ) -> Result<(DVector<f64>, f64), Error> {
+        descent(point, &self.table, self.freedom, self.loss, self.record, check)
+    }
+
+    fn bounds(&self, point: &Point) -> Bounds {
+        point.bounds(&self.table, self.record, self.freedom)
+    }
+
+    fn step(&self, point: &Point, step: &DVector<f64>) -> Point {
+        point.moved(step, &self.table)
+    }
+
+    fn is_linear(&self, unknown: usize) -> bool {
+        self.table.is_linear(unknown)
+    }
+
+    /// What rounding leaves of the outputs' squares.
+    fn rounding(&self) -> f64 {
+        /// The square of some thousand times the machine's epsilon.
+        const PART: f64 = 1e-25;
+        let outputs = self.record.experiments().iter().flat_map(|e| e.output.column_iter());
+        let scales = self.loss.scales.iter().cycle();
+        PART * outputs.zip(scales).map(|(y, scale)| scale.powi(2) * y.norm_squared()).sum::<f64>()
+    }
+}
+
+/// The scored rows of residuals, one matrix an experiment.
+pub(crate) fn scored<'a>(
+    residuals: &'a [Matrix],
+    record: &'a Record,
+) -> impl Iterator<Item = DMatrixView<'a, f64>> {
+    let runs = residuals.iter().zip(record.experiments());
+    runs.flat_map(|(residual, experiment)| experiment.scored_rows(residual))
+}
+
+/// Adds a block of rows to the equations; returns its cost.
+fn add(equations: &mut NormalEquations, rows: Rows, loss: &Loss) -> f64 {
+    let mut cost = 0.0;
+    for (output, mut regressor) in rows.regressors.into_iter().enumerate() {
+        let mut target = rows.residuals.row(output).into_owned();
+        for (mut row, value) in regressor.column_iter_mut().zip(target.iter_mut()) {
+            let (weight, own) = loss.of(output, *value);
+            cost += own;
+            row *= weight.sqrt();
+            *value *= weight.sqrt();
+        }
+        let target = Matrix::from_row_slice(1, target.len(), target.as_slice());
+        equations.add(&regressor, &target);
+    }
+    cost
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::hysteresis::{Derivatives, Parameters};
+    use crate::chain::looped::{model, record, run};
+    use crate::chain::point::DynamicsFreedom;
+    use crate::fit::preparation::Prepared;
+
+    #[test]
+    fn gradient_is_the_one_that_all_derivatives_give() {
+        let model = model();
+        // one with a run-in from rest, and one that begins in motion and holds samples out
+        let runs = vec![run(1.5, 0.0, 130, vec![]), run(1.5, 0.3, 0, vec![300..420, 500..520])];
+        let record = record(&model, runs);
+        let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
+        let prepared = Prepared::scoring_all(&record, channels).unwrap();
+        let mut point = prepared.point_of(&model).unwrap();
+        point.dynamics.delay = 2;
+        point.pasts[1].state.iter_mut().enumerate().for_each(|(j, x)| *x = 0.1 * (j + 1) as f64);
+        let freedom = Freedom {
+            weights: true,
+            derivatives: Derivatives { thresholds: true, half_widths: true, starts: true },
+            identity: true,
+            dynamics: DynamicsFreedom::Everything,
+        };
+        let loss = Loss { scales: vec![1.0, 0.4], turns: vec![0.8, f64::INFINITY] };
+        let record = &prepared.record;
+        let mut check = || Ok(());
+        let problem = Estimation::new(&point, record, freedom, &loss);
+        let all = problem.linearize(&point, &mut check).unwrap();
+        let (found, cost) = problem.gradient(&point, &mut check).unwrap();
+        let expected = &all.descent;
+        assert!((cost / all.cost - 1.0).abs() < 1e-12);
+        assert!(
+            expected.iter().filter(|value| value.abs() > 1e-6).count() > expected.len() * 9 / 10
+        );
+        for (i, (found, expected)) in found.iter().zip(expected.iter()).enumerate() {
+            let scale = (all.gram[(i, i)] * all.cost).sqrt();
+            assert!((found - expected).abs() <= 1e-11 * scale, "{i}: {found} {expected}");
+        }
+    }
+}
