@@ -3,7 +3,7 @@
 use crate::Matrix;
 use crate::chain::hysteresis::{Derivatives, Sensitivity};
 use crate::chain::point::{Layout, Point};
-use crate::effects::{InnerLoop, Law, Sees};
+use crate::effects::{InnerLoop, Law, Place, Sees};
 use std::ops::Range;
 
 /// What was recorded of a block of samples, where in a column of signals.
@@ -52,7 +52,7 @@ impl Signals {
         };
         let sizes = point.channels.iter().map(|c| Sensitivity::columns(c, wanted));
         let columns = sizes.map(&mut take).collect();
-        let reading = point.readers().map(|effect| effect.block().values().len());
+        let reading = point.play_curves().map(|curves| curves.values().len());
         let readings = reading.map(&mut take).collect();
         let states = take(point.dynamics.order());
         let loops = point.loops().map(|inner| take(1 + inner.law.stops())).collect();
@@ -114,17 +114,21 @@ pub(crate) fn injections(
     }
     let (mut number, mut readings) = (0, signals.readings.iter());
     for (effect, unknowns) in point.effects.iter().zip(&layout.effects) {
-        if effect.block().reads()
-            && let Some(columns) = readings.next()
-        {
-            for (unknown, column) in unknowns.clone().zip(columns.clone()) {
-                gathered.add(unknown, places.v.start + effect.block().channel(), column, 1.0);
+        match effect.place() {
+            Place::Curves(own) => {
+                let columns = readings.next().cloned().unwrap_or_default();
+                for (unknown, column) in unknowns.clone().zip(columns) {
+                    gathered.add(unknown, places.v.start + own.input(), column, 1.0);
+                }
             }
-        }
-        let mut first = unknowns.start;
-        for inner in effect.block().loops() {
-            first = gathered.add_loop(inner, number, first);
-            number += 1;
+            Place::Loops(own) => {
+                let mut first = unknowns.start;
+                for inner in own.loops() {
+                    first = gathered.add_loop(inner, number, first);
+                    number += 1;
+                }
+            }
+            _ => {}
         }
     }
     let mut found = gathered.found;

@@ -99,7 +99,7 @@ impl Layout {
             set(&unknowns.c, section.c.as_slice());
         }
         for (effect, unknowns) in point.effects.iter().zip(&self.effects) {
-            set(unknowns, &effect.block().values());
+            set(unknowns, &effect.values());
         }
         for (element, unknown) in point.dynamics.d.iter().zip(&self.feedthrough) {
             if let &Some(i) = unknown {

@@ -1,7 +1,7 @@
 //! Everything that is estimated, as one point, and where each unknown stands in a step away from it.
 
 use crate::chain::hysteresis::{Derivatives, Parameters};
-use crate::effects::{Effect, Stage};
+use crate::effects::{Effect, OutputStage, Place, PlaceMut};
 use crate::linear::Sections;
 use crate::{Matrix, Record};
 use nalgebra::DVector;
@@ -124,10 +124,10 @@ impl Layout {
                 feedthrough.push(free.then(|| take(true, 1).start));
             }
         }
-        let values = |effect: &Effect| effect.block().values().len();
-        let effects = point.effects.iter();
-        let effects =
-            effects.map(|e| take(e.block().sections(1.0).is_empty(), values(e))).collect();
+        let effects = point.effects.iter().map(|effect| {
+            take(effect.place().parallel_sections().is_none(), effect.values().len())
+        });
+        let effects = effects.collect();
         let offsets = point.offsets.iter().map(|knots| take(true, knots.len())).collect();
         let unknown = |past: &Past| derivatives.starts && past.plays.is_some();
         let plays = point
@@ -223,7 +223,7 @@ impl Point {
             }
         }
         for (effect, unknowns) in self.effects.iter().zip(&layout.effects) {
-            let block = effect.block();
+            let Some(block) = effect.block() else { continue };
             let limits = block.values().into_iter().zip(block.bounds());
             for ((value, (low, high)), i) in limits.zip(unknowns.clone()) {
                 if freedom.weights {
@@ -235,8 +235,9 @@ impl Point {
         }
         for (section, unknowns) in self.dynamics.sections.iter().zip(&layout.sections) {
             let outputs = self.dynamics.outputs();
-            if let Some(effect) = section.beside {
-                let (low, high) = self.effects[effect].block().section_bounds(self.rate);
+            let effect = section.beside.map(|effect| self.effects[effect].place());
+            if let Some(own) = effect.and_then(Place::parallel_sections) {
+                let (low, high) = own.section_bounds(self.rate);
                 if let ([a1], true) = (&section.a[..], !unknowns.a.is_empty()) {
                     bound(unknowns.a.start, low - a1, high - a1);
                 }
@@ -244,8 +245,7 @@ impl Point {
                 let order = section.order();
                 let others = unknowns.b.clone().enumerate();
                 let drives = |place: usize| section.b.column(place / order).amax() != 0.0;
-                let input = self.effects[effect].block().channel();
-                for (place, i) in others.filter(|&(place, _)| place / order != input) {
+                for (place, i) in others.filter(|&(place, _)| place / order != own.input()) {
                     debug_assert!(!drives(place));
                     bound(i, 0.0, 0.0);
                 }
@@ -316,10 +316,10 @@ impl Point {
     /// The point with one more effect, in its place of the chain.
     pub(crate) fn with_effect(&self, effect: Effect) -> Self {
         let mut point = self.clone();
-        let stage = |effect: &Effect| effect.block().stage();
-        let place = point.effects.partition_point(|other| stage(other) <= stage(&effect));
-        let sections = effect.block().sections(point.rate);
-        let input = effect.block().channel();
+        let place = point.effects.partition_point(|other| other.stage() <= effect.stage());
+        let parallel = effect.place().parallel_sections();
+        let parallel = parallel.map(|own| (own.input(), own.sections(point.rate)));
+        let (input, sections) = parallel.unwrap_or_default();
         point.effects.insert(place, effect);
         for section in &mut point.dynamics.sections {
             section.beside = section.beside.map(|own| if own >= place { own + 1 } else { own });
@@ -363,22 +363,23 @@ impl Point {
     pub(crate) fn blocks(&self) -> Vec<Effect> {
         let mut effects = self.effects.clone();
         for (place, effect) in effects.iter_mut().enumerate() {
-            let input = effect.block().channel();
+            let PlaceMut::Parallel(effect) = effect.place_mut() else { continue };
+            let input = effect.input();
             let own = self.dynamics.sections.iter().filter(|s| s.beside == Some(place));
             let sections: Vec<_> = own
                 .map(|s| (s.a.clone(), s.b.column(input).iter().copied().collect::<Vec<_>>()))
                 .collect();
             if !sections.is_empty() {
                 let dead_time = self.dynamics.delay;
-                effect.block_mut().set_sections(&sections, dead_time, self.rate);
+                effect.set_sections(&sections, dead_time, self.rate);
             }
         }
         effects
     }
 
-    /// The effects of a stage.
-    pub(crate) fn at_stage(&self, stage: Stage) -> impl Iterator<Item = &Effect> {
-        self.effects.iter().filter(move |effect| effect.block().stage() == stage)
+    /// The effects of the output stage.
+    pub(crate) fn output_stages(&self) -> impl Iterator<Item = &dyn OutputStage> {
+        self.effects.iter().filter_map(|effect| effect.place().output_stage())
     }
 
     /// The point one step away. A section whose poles would leave the unit circle goes as far as they
@@ -422,10 +423,10 @@ impl Point {
             moved.dynamics.hold_gain();
         }
         for (effect, unknowns) in moved.effects.iter_mut().zip(&layout.effects) {
-            let mut values = effect.block().values();
+            let mut values = effect.values();
             add(&mut values, unknowns);
             if !unknowns.is_empty() {
-                effect.block_mut().set(&values);
+                effect.set(&values);
             }
         }
         for (index, start) in moved.pasts.iter_mut().enumerate() {

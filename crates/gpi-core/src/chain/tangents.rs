@@ -3,7 +3,7 @@
 use crate::chain::injections::{Injection, Places, Signals, injections};
 use crate::chain::lanes::{LANES, Lanes, NONE, Weights, add, pass, relax};
 use crate::chain::point::{Layout, Point};
-use crate::effects::{InnerLoop, Sees, Slope, Stage};
+use crate::effects::{InnerLoop, Sees, Slope};
 use crate::linear::Section;
 use crate::{Experiment, Matrix};
 use pulp::Simd;
@@ -303,8 +303,7 @@ impl Tile {
 
 /// The output that each effect of the output stage acts on, in the order in which they act.
 pub(super) fn sensed(point: &Point) -> Vec<usize> {
-    let effects = point.at_stage(Stage::Output);
-    let mut sensed: Vec<usize> = effects.map(|effect| effect.block().channel()).collect();
+    let mut sensed: Vec<usize> = point.output_stages().map(|effect| effect.output()).collect();
     sensed.sort_unstable();
     sensed
 }

@@ -1,6 +1,6 @@
 //! Noise with memory.
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Finding, Quantity, Stage, Units};
 
 /// `e(k) = sum_i a_i e(k-i) + w(k)`, w white: what is left remembers itself, and nothing else.
 ///
@@ -23,34 +23,11 @@ impl ColouredNoise {
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = false;
-
-    /// None: it is what remains when nothing else explains the residual.
-    pub(super) fn candidates(_: &Situation) -> Vec<Candidate> {
-        Vec::new()
-    }
 }
 
-impl Block for ColouredNoise {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
-    fn values(&self) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn set(&mut self, _: &[f64]) {}
-
-    fn steps(&self) -> Vec<f64> {
-        Vec::new()
+impl Finding for ColouredNoise {
+    fn output(&self) -> Option<usize> {
+        Some(self.output)
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {

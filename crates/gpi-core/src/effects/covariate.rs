@@ -1,6 +1,6 @@
 //! Another measured column that leaks in.
 
-use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
+use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
 use crate::Record;
 
 /// `y += g L x`: a measured column x (a temperature, a neighbouring axis) leaks in, at once or through a
@@ -34,7 +34,7 @@ impl Covariate {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let shortest = 1.0 / situation.record.rate();
         let longest = 0.3 * situation.duration();
         let lags = std::iter::once(0.0)
@@ -67,7 +67,7 @@ impl Covariate {
                         time_constant,
                         step,
                     };
-                    found.push(Candidate::linear(block, [0]));
+                    found.push(Proposal::linear(block, [0]));
                 }
             }
         }
@@ -94,22 +94,6 @@ fn follows_an_input(record: &Record, column: usize) -> bool {
 }
 
 impl Block for Covariate {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        if self.moves_stage { Stage::Displaced } else { Self::STAGE }
-    }
-
-    fn elsewhere(&self) -> Option<Effect> {
-        Some(Self { moves_stage: !self.moves_stage, ..self.clone() }.into())
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         if self.time_constant > 0.0 { vec![self.gain, self.time_constant] } else { vec![self.gain] }
     }
@@ -139,9 +123,23 @@ impl Block for Covariate {
         }
         quantities
     }
+}
+
+impl Added for Covariate {
+    fn output(&self) -> usize {
+        self.output
+    }
+
+    fn moves_stage(&self) -> bool {
+        self.moves_stage
+    }
+
+    fn set_moves_stage(&mut self, moves_stage: bool) {
+        self.moves_stage = moves_stage;
+    }
 
     /// The lagged column.
-    fn rest(&self, _: f64, moment: Moment) -> Vec<f64> {
+    fn rest(&self, moment: Moment) -> Vec<f64> {
         vec![moment.covariates.get(self.column).copied().unwrap_or(0.0)]
     }
 

@@ -1,6 +1,6 @@
 //! Slow relaxation driven by v.
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Block, Coefficients, ParallelSections, Proposal, Quantity, Situation, Stage, Units};
 
 /// `y += sum_i c_i L_i v` with first-order lags L_i of unit gain and time constants T_i: after a step the
 /// output goes on by c_i within a few T_i.
@@ -41,7 +41,7 @@ impl Creep {
     pub(super) const REPEATS: bool = true;
 
     /// One, two and three lags between somewhat more than the shortest and the record's length.
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const MORE: f64 = 5.0 / 3.0;
         let (low, high) = (MORE * shortest(situation.record.rate()), situation.duration());
         if situation.outputs().len() > 1 || high < 4.0 * low {
@@ -55,25 +55,13 @@ impl Creep {
             let gains = vec![0.0; time_constants.len()];
             let block = Self { input, gains, time_constants: time_constants.clone(), dead_time: 0 };
             let lags = time_constants.len();
-            Candidate::linear(block, lags..2 * lags)
+            Proposal::linear(block, lags..2 * lags)
         };
         situation.inputs().flat_map(|input| sets.iter().map(move |set| block(input, set))).collect()
     }
 }
 
 impl Block for Creep {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         [&self.time_constants[..], &self.gains[..]].concat()
     }
@@ -103,8 +91,14 @@ impl Block for Creep {
         }
         quantities
     }
+}
 
-    fn sections(&self, rate: f64) -> Vec<(Vec<f64>, Vec<f64>)> {
+impl ParallelSections for Creep {
+    fn input(&self) -> usize {
+        self.input
+    }
+
+    fn sections(&self, rate: f64) -> Vec<Coefficients> {
         let lag = |(time, gain): (&f64, &f64)| {
             let pole = (-1.0 / (time * rate)).exp();
             (vec![-pole], vec![gain * (1.0 - pole)])
@@ -112,7 +106,7 @@ impl Block for Creep {
         self.time_constants.iter().zip(&self.gains).map(lag).collect()
     }
 
-    fn set_sections(&mut self, sections: &[(Vec<f64>, Vec<f64>)], dead_time: usize, rate: f64) {
+    fn set_sections(&mut self, sections: &[Coefficients], dead_time: usize, rate: f64) {
         self.dead_time = dead_time;
         for (i, (a, b)) in sections.iter().enumerate() {
             let pole = -a[0];

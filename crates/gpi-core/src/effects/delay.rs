@@ -1,6 +1,6 @@
 //! Dead time beyond the linear model's.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
+use super::{Block, InputStage, Proposal, Quantity, Situation, Stage, Units};
 
 /// `u_d(t) = u(t - T)`: the drive arrives T later; between samples u is a straight line.
 ///
@@ -23,26 +23,14 @@ impl Delay {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let delays =
-            |input| [1.0, 2.0, 4.0, 8.0].map(|samples| Candidate::finite(Self { input, samples }));
+            |input| [1.0, 2.0, 4.0, 8.0].map(|samples| Proposal::finite(Self { input, samples }));
         situation.inputs().flat_map(delays).collect()
     }
 }
 
 impl Block for Delay {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         vec![self.samples]
     }
@@ -62,9 +50,15 @@ impl Block for Delay {
     fn quantities(&self, _: Units) -> Vec<Quantity> {
         vec![Quantity::new("delay", "samples", self.samples)]
     }
+}
+
+impl InputStage for Delay {
+    fn input(&self) -> usize {
+        self.input
+    }
 
     /// The latest inputs, the newest first.
-    fn rest(&self, first: f64, _: Moment) -> Vec<f64> {
+    fn rest(&self, first: f64) -> Vec<f64> {
         vec![first; LONGEST as usize + 2]
     }
 
@@ -72,7 +66,7 @@ impl Block for Delay {
         self.samples
     }
 
-    fn drive(&self, state: &mut [f64], input: f64, _: Moment) -> f64 {
+    fn drive(&self, state: &mut [f64], input: f64, _: f64) -> f64 {
         let needed = self.samples as usize + 2;
         let state = &mut state[..needed];
         state.rotate_right(1);

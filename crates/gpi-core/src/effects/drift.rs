@@ -1,6 +1,6 @@
 //! Slow change that the input does not drive.
 
-use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units, knots};
+use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units, knots};
 
 /// `y += d(t)`, d a slow function of time: a smooth curve through evenly spaced knots, the first of which
 /// is 0 (the offset at the start is the model's).
@@ -28,11 +28,11 @@ impl Drift {
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let duration = situation.duration();
         let block = |output, knots: usize| {
             let (changes, span) = (vec![0.0; knots - 1], situation.span(output));
-            Candidate::linear(
+            Proposal::linear(
                 Self { output, moves_stage: false, changes, duration, span },
                 0..knots - 1,
             )
@@ -43,22 +43,6 @@ impl Drift {
 }
 
 impl Block for Drift {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        if self.moves_stage { Stage::Displaced } else { Self::STAGE }
-    }
-
-    fn elsewhere(&self) -> Option<Effect> {
-        Some(Self { moves_stage: !self.moves_stage, ..self.clone() }.into())
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         self.changes.clone()
     }
@@ -77,6 +61,20 @@ impl Block for Drift {
             Quantity::new(format!("drift[{:.4} s]", time(i)), units.output, value)
         };
         self.changes.iter().enumerate().map(change).collect()
+    }
+}
+
+impl Added for Drift {
+    fn output(&self) -> usize {
+        self.output
+    }
+
+    fn moves_stage(&self) -> bool {
+        self.moves_stage
+    }
+
+    fn set_moves_stage(&mut self, moves_stage: bool) {
+        self.moves_stage = moves_stage;
     }
 
     fn add(&self, _: &mut [f64], moment: Moment) -> f64 {

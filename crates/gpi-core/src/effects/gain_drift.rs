@@ -1,6 +1,8 @@
 //! Sensitivity that changes slowly.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units, knots};
+use super::{
+    Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units, knots,
+};
 
 /// `y = x (1 + g(t))`, g a slow function of time: a smooth curve through evenly spaced knots, the first
 /// of which is 0 (the gain at the start is the model's).
@@ -23,11 +25,11 @@ impl GainDrift {
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let duration = situation.duration();
         let block = |output, knots: usize| {
             let block = Self { output, changes: vec![0.0; knots - 1], duration };
-            Candidate::linear(block, 0..knots - 1)
+            Proposal::linear(block, 0..knots - 1)
         };
         let blocks = |output| [2, 3, 5, 9, 17, 33].map(|knots| block(output, knots));
         situation.outputs().flat_map(blocks).collect()
@@ -39,18 +41,6 @@ impl GainDrift {
 }
 
 impl Block for GainDrift {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         self.changes.clone()
     }
@@ -69,6 +59,12 @@ impl Block for GainDrift {
             Quantity::new(format!("gain_change[{:.4} s]", time(i)), "", value)
         };
         self.changes.iter().enumerate().map(change).collect()
+    }
+}
+
+impl OutputStage for GainDrift {
+    fn output(&self) -> usize {
+        self.output
     }
 
     fn sense(&self, _: &mut [f64], output: f64, moment: Moment) -> (f64, Slope) {

@@ -1,6 +1,6 @@
 //! Minor loops that are not congruent.
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Block, PlayCurves, Proposal, Quantity, Situation, Stage, Units};
 
 /// Plays read through curves: `v = sum_i p_i (F_i + s q(f_i, r_i))` with `f_i = (F_i - m) / s` and
 /// `dq/df = sum_a sum_b c_ab P_a(f) P_b(2 r / R - 1)`, a = 1 .. A, b = 0 .. B - 1, P Legendre's
@@ -38,7 +38,7 @@ impl HysteresisShape {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         /// A and B.
         const SIZES: [(usize, usize); 2] = [(2, 3), (7, 5)];
         let mut candidates = Vec::new();
@@ -51,7 +51,7 @@ impl HysteresisShape {
             for (degrees, widths) in SIZES {
                 let coefficients = vec![0.0; degrees * widths];
                 let block = Self { input, coefficients, widths, middle, scale, widest };
-                candidates.push(Candidate::linear(block, 0..degrees * widths));
+                candidates.push(Proposal::linear(block, 0..degrees * widths));
             }
         }
         candidates
@@ -85,18 +85,6 @@ impl HysteresisShape {
 }
 
 impl Block for HysteresisShape {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         self.coefficients.clone()
     }
@@ -128,6 +116,12 @@ impl Block for HysteresisShape {
             format!("{count} coefficients in rows of {widths}; at most {MOST} rows of {MOST}")
         })
     }
+}
+
+impl PlayCurves for HysteresisShape {
+    fn input(&self) -> usize {
+        self.input
+    }
 
     fn read(&self, half_width: f64, place: f64) -> (f64, f64) {
         if half_width == 0.0 {
@@ -143,10 +137,6 @@ impl Block for HysteresisShape {
             density += weight * own;
         }
         (place + self.scale * curve, 1.0 + density)
-    }
-
-    fn reads(&self) -> bool {
-        true
     }
 
     fn read_slopes(&self, half_width: f64, place: f64, weight: f64, slopes: &mut [f64]) {

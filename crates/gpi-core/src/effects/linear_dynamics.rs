@@ -1,6 +1,6 @@
 //! A mode that the linear part lacks.
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Block, Coefficients, ParallelSections, Proposal, Quantity, Situation, Stage, Units};
 
 /// `(b1 q^-1 + b2 q^-2) / (1 + a1 q^-1 + a2 q^-2)` from v to y, beside G: one more mode, or two real
 /// poles.
@@ -28,7 +28,7 @@ impl LinearDynamics {
     pub(super) const REPEATS: bool = true;
 
     /// Lightly damped modes from a few periods a record to close to half the rate.
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const MODES: usize = 24;
         const DAMPING: f64 = 0.03;
         let rate = situation.record.rate();
@@ -44,23 +44,11 @@ impl LinearDynamics {
             Self { input, denominator, numerator: vec![0.0; 2], rate, dead_time: 0 }
         };
         let modes = |input| (0..MODES).map(move |place| mode(input, place));
-        situation.inputs().flat_map(modes).map(|mode| Candidate::linear(mode, 2..4)).collect()
+        situation.inputs().flat_map(modes).map(|mode| Proposal::linear(mode, 2..4)).collect()
     }
 }
 
 impl Block for LinearDynamics {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         [&self.denominator[..], &self.numerator[..]].concat()
     }
@@ -98,12 +86,18 @@ impl Block for LinearDynamics {
             gain,
         ]
     }
+}
 
-    fn sections(&self, _: f64) -> Vec<(Vec<f64>, Vec<f64>)> {
+impl ParallelSections for LinearDynamics {
+    fn input(&self) -> usize {
+        self.input
+    }
+
+    fn sections(&self, _: f64) -> Vec<Coefficients> {
         vec![(self.denominator.clone(), self.numerator.clone())]
     }
 
-    fn set_sections(&mut self, sections: &[(Vec<f64>, Vec<f64>)], dead_time: usize, _: f64) {
+    fn set_sections(&mut self, sections: &[Coefficients], dead_time: usize, _: f64) {
         self.dead_time = dead_time;
         (self.denominator, self.numerator) = sections[0].clone();
     }

@@ -1,6 +1,6 @@
 //! Isolated wrong samples.
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Finding, Quantity, Stage, Units};
 
 /// Samples that stand apart from their neighbours by far more than the noise; the fit counts them by
 /// Huber's loss.
@@ -22,34 +22,11 @@ impl Outliers {
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = false;
-
-    /// None: they are counted in the residual.
-    pub(super) fn candidates(_: &Situation) -> Vec<Candidate> {
-        Vec::new()
-    }
 }
 
-impl Block for Outliers {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        0
-    }
-
-    fn values(&self) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn set(&mut self, _: &[f64]) {}
-
-    fn steps(&self) -> Vec<f64> {
-        Vec::new()
+impl Finding for Outliers {
+    fn output(&self) -> Option<usize> {
+        None
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {

@@ -1,6 +1,6 @@
 //! A sensor's curve.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units};
+use super::{Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units};
 
 /// `y = x + s sum_m c_m ((x - m) / s)^m`, m = 2 ..: a static curve after G, its slope carried by the plays.
 ///
@@ -24,7 +24,7 @@ impl OutputNonlinearity {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let block = |output, terms: usize| {
             let (low, high) = Situation::range(situation.displacements, output);
             let (middle, scale) = (0.5 * (low + high), 0.5 * (high - low));
@@ -35,25 +35,13 @@ impl OutputNonlinearity {
         let usable = |block: &Self| block.scale > 0.0;
         let candidate = |block: Self| {
             let terms = block.coefficients.len();
-            Candidate::linear(block, 0..terms)
+            Proposal::linear(block, 0..terms)
         };
         blocks.filter(usable).map(candidate).collect()
     }
 }
 
 impl Block for OutputNonlinearity {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         self.coefficients.clone()
     }
@@ -71,6 +59,12 @@ impl Block for OutputNonlinearity {
             Quantity::new(format!("curve[{}]", i + 2), units.output, c * self.scale)
         };
         self.coefficients.iter().enumerate().map(term).collect()
+    }
+}
+
+impl OutputStage for OutputNonlinearity {
+    fn output(&self) -> usize {
+        self.output
     }
 
     fn sense(&self, _: &mut [f64], output: f64, _: Moment) -> (f64, Slope) {

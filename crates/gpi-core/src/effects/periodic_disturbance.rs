@@ -1,6 +1,6 @@
 //! A line that the input does not drive.
 
-use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
+use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
 use crate::spectrum::{Strongest, near, peak, power};
 
 /// `y += a cos(2 pi f t) + b sin(2 pi f t)`: mains hum, a pump, a vibration.
@@ -34,7 +34,7 @@ impl PeriodicDisturbance {
     pub(super) const REPEATS: bool = true;
 
     /// The line of the residual's spectrum that stands out most from its neighbours.
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let duration = situation.duration();
         let block = |output: usize| {
             let frequency = outstanding(situation, output)?;
@@ -48,7 +48,7 @@ impl PeriodicDisturbance {
                 duration,
                 span,
             };
-            Some(Candidate::linear(block, 1..3))
+            Some(Proposal::linear(block, 1..3))
         };
         situation.outputs().filter_map(block).collect()
     }
@@ -109,22 +109,6 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Option<Vec
 }
 
 impl Block for PeriodicDisturbance {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        if self.moves_stage { Stage::Displaced } else { Self::STAGE }
-    }
-
-    fn elsewhere(&self) -> Option<Effect> {
-        Some(Self { moves_stage: !self.moves_stage, ..self.clone() }.into())
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         vec![self.frequency, self.cosine, self.sine]
     }
@@ -150,9 +134,23 @@ impl Block for PeriodicDisturbance {
             Quantity::new("phase", "rad", (-self.sine).atan2(self.cosine)),
         ]
     }
+}
+
+impl Added for PeriodicDisturbance {
+    fn output(&self) -> usize {
+        self.output
+    }
+
+    fn moves_stage(&self) -> bool {
+        self.moves_stage
+    }
+
+    fn set_moves_stage(&mut self, moves_stage: bool) {
+        self.moves_stage = moves_stage;
+    }
 
     /// Samples since the phase was worked out anew, its cosine and sine, and those of one sample's turn.
-    fn rest(&self, _: f64, moment: Moment) -> Vec<f64> {
+    fn rest(&self, moment: Moment) -> Vec<f64> {
         let (sine, cosine) = (std::f64::consts::TAU * self.frequency / moment.rate).sin_cos();
         vec![0.0, 1.0, 0.0, cosine, sine]
     }
@@ -189,7 +187,7 @@ mod tests {
         };
         let rate = 2000.0;
         let moment = |k: u32| Moment { time: f64::from(k) / rate, rate, covariates: &[] };
-        let mut state = line.rest(0.0, moment(0));
+        let mut state = line.rest(moment(0));
         for k in 0..120_000 {
             let phase = std::f64::consts::TAU * line.frequency * moment(k).time;
             let exact = 0.3 * phase.cos() - 0.7 * phase.sin();

@@ -1,6 +1,6 @@
 //! Half-widths that grow with speed.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
+use super::{Block, PlayWidths, Proposal, Quantity, Situation, Stage, Units};
 
 /// `r(k) = r (1 + a g(s)) + b g(s)` for every play of half-width r > 0, s the speed |du/dt|: loops open
 /// with speed, in proportion to the half-width, by the same width, or both.
@@ -56,7 +56,7 @@ impl RateDependence {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         /// Exponents, and knees over the median speed.
         const LAWS: [(f64, f64); 4] = [(0.4, 0.03), (0.0, 0.1), (0.0, 1.0), (-1.0, 1.0)];
         /// Seconds.
@@ -75,11 +75,11 @@ impl RateDependence {
         let mut candidates = Vec::new();
         for (block, usual) in situation.inputs().map(block).filter(usable) {
             let straight = [vec![0], vec![1], vec![0, 1]];
-            candidates.extend(straight.map(|places| Candidate::linear(block.clone(), places)));
+            candidates.extend(straight.map(|places| Proposal::linear(block.clone(), places)));
             for (exponent, knee) in LAWS {
                 for lag in LAGS {
                     let law = Some(SpeedLaw { exponent, knee: knee * usual, lag });
-                    candidates.push(Candidate::linear(Self { law, ..block.clone() }, [0, 1]));
+                    candidates.push(Proposal::linear(Self { law, ..block.clone() }, [0, 1]));
                 }
             }
         }
@@ -88,18 +88,6 @@ impl RateDependence {
 }
 
 impl Block for RateDependence {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         let law = self.law.map(|law| [law.exponent, law.knee.ln(), law.lag]);
         [self.relative, self.absolute].into_iter().chain(law.into_iter().flatten()).collect()
@@ -143,8 +131,14 @@ impl Block for RateDependence {
         }
         quantities
     }
+}
 
-    fn rest(&self, _: f64, _: Moment) -> Vec<f64> {
+impl PlayWidths for RateDependence {
+    fn input(&self) -> usize {
+        self.input
+    }
+
+    fn rest(&self) -> Vec<f64> {
         vec![0.0]
     }
 

@@ -1,7 +1,9 @@
 //! A resonance that moves with amplitude.
 
 use super::loop_signals::{LoopSignal, Shape, families};
-use super::{Block, Candidate, InnerLoop, Law, Quantity, Sees, Situation, Stage, Units};
+use super::{
+    Block, ClosedLoops, InnerLoop, Law, Proposal, Quantity, Sees, Situation, Stage, Units,
+};
 
 /// Loops around G: a restoring force that is not in proportion to the displacement acts inside the
 /// mechanics, `x+ = A x + B v + E w`, `w = law(S x + T v)`.
@@ -25,7 +27,7 @@ impl Stiffness {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         // A lag has no resonance to move.
         if situation.dynamics.order() < 2 {
             return Vec::new();
@@ -39,7 +41,7 @@ impl Stiffness {
 }
 
 /// A cube of the displacement, and a square beside it.
-fn powers(situation: &Situation) -> Vec<Candidate> {
+fn powers(situation: &Situation) -> Vec<Proposal<Stiffness>> {
     let order = situation.dynamics.order();
     // half the span of the displacement
     let scale = 0.5 * situation.span(0);
@@ -52,11 +54,15 @@ fn powers(situation: &Situation) -> Vec<Candidate> {
         drives: vec![0.0; order],
     };
     let block = Stiffness { loops: [2, 3].map(power).to_vec() };
-    [order..2 * order, 0..2 * order].map(|places| Candidate::linear(block.clone(), places)).to_vec()
+    [order..2 * order, 0..2 * order].map(|places| Proposal::linear(block.clone(), places)).to_vec()
 }
 
 /// Loops through these signals.
-fn around(shape: Shape, signals: &[LoopSignal], situation: &Situation) -> Option<Candidate> {
+fn around(
+    shape: Shape,
+    signals: &[LoopSignal],
+    situation: &Situation,
+) -> Option<Proposal<Stiffness>> {
     /// Half-widths over the root mean square.
     const HALF_WIDTHS: [f64; 3] = [0.15, 0.5, 1.5];
     let order = situation.dynamics.order();
@@ -80,7 +86,7 @@ fn around(shape: Shape, signals: &[LoopSignal], situation: &Situation) -> Option
         places.extend(first..first + order);
         first += values_of(inner);
     }
-    (!places.is_empty()).then(|| Candidate::linear(block, places))
+    (!places.is_empty()).then(|| Proposal::linear(block, places))
 }
 
 /// How many values a loop has.
@@ -109,21 +115,6 @@ fn groups(inner: &mut InnerLoop) -> Vec<Group<'_>> {
 }
 
 impl Block for Stiffness {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        match self.loops.first().map(|inner| &inner.sees) {
-            Some(Sees::Output(output)) => *output,
-            _ => 0,
-        }
-    }
-
     fn values(&self) -> Vec<f64> {
         let mut values = Vec::new();
         for inner in &mut self.loops.clone() {
@@ -196,14 +187,6 @@ impl Block for Stiffness {
         bounds
     }
 
-    fn loops(&self) -> &[InnerLoop] {
-        &self.loops
-    }
-
-    fn loops_mut(&mut self) -> &mut [InnerLoop] {
-        &mut self.loops
-    }
-
     fn quantities(&self, _: Units) -> Vec<Quantity> {
         let mut found = Vec::new();
         for (q, inner) in self.loops.iter().enumerate() {
@@ -223,5 +206,15 @@ impl Block for Stiffness {
             }
         }
         found
+    }
+}
+
+impl ClosedLoops for Stiffness {
+    fn loops(&self) -> &[InnerLoop] {
+        &self.loops
+    }
+
+    fn loops_mut(&mut self) -> &mut [InnerLoop] {
+        &mut self.loops
     }
 }
