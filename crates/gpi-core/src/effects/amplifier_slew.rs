@@ -1,10 +1,11 @@
-//! The amplifier's largest slope.
+//! The amplifier's slew limit.
+//!
+//! `u_s(k) = u_s(k-1) + clamp(u(k) - u_s(k-1), -s Ts, s Ts)`, (E2) in the documentation's theory, with the
+//! limit s and the sampling interval Ts: the drive follows the input, but never faster than s.
 
 use super::{Block, InputStage, Proposal, Quantity, Situation, Stage, Units};
 
-/// `u_s(k) = u_s(k-1) + clamp(u(k) - u_s(k-1), -s Ts, s Ts)`: the drive cannot change faster than s.
-///
-/// (E2) in the documentation's theory.
+/// The drive cannot change faster than s: `|du_s/dt| <= s`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AmplifierSlew {
     /// The input that the amplifier drives.
@@ -20,8 +21,8 @@ impl AmplifierSlew {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    /// Limits that so many of the record's steps stay below: an amplifier that is slower than most of
-    /// them would be seen at once.
+    /// Limits at quantiles of the record's steps: an amplifier that is slower than most of the steps is seen
+    /// without a search.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const QUANTILES: [f64; 10] = [0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 0.9995];
         let rate = situation.record.rate();
@@ -69,7 +70,7 @@ impl InputStage for AmplifierSlew {
         self.input
     }
 
-    /// The drive itself.
+    /// The latest drive.
     fn rest(&self, first: f64) -> Vec<f64> {
         vec![first]
     }

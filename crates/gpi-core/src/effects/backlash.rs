@@ -1,11 +1,12 @@
-//! Mechanical play after G.
+//! Mechanical play (backlash) after G.
+//!
+//! `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`, (E10) in the documentation's theory: the output follows the
+//! displacement x only while the gap of width 2 b is closed. It is the play operator of half-width b.
 
 use super::{Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units};
 use crate::operators::play;
 
-/// `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`: the output follows only when the gap is closed.
-///
-/// (E10) in the documentation's theory.
+/// The output follows only while the gap is closed: `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Backlash {
     /// The output behind the gap.
@@ -21,7 +22,7 @@ impl Backlash {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    /// Half-widths from a ten-thousandth of the span to a fifth.
+    /// Half-widths between a ten-thousandth and a fifth of the span.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const COUNT: usize = 12;
         let blocks = |output| {
@@ -62,7 +63,7 @@ impl OutputStage for Backlash {
         self.output
     }
 
-    /// The output itself, in the middle of the gap.
+    /// The latest output; at first the displacement is in the middle of the gap.
     fn rest(&self, first: f64) -> Vec<f64> {
         vec![play(self.half_width, first, 0.0)]
     }

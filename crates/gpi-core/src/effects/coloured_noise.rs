@@ -1,10 +1,12 @@
-//! Noise with memory.
+//! Autocorrelated noise.
+//!
+//! `e(k) = sum_i a_i e(k-i) + w(k)`, w white, (E15) in the documentation's theory: the residual e depends on
+//! its own past (an autoregressive process), and on nothing else. It is looked for last, when nothing else
+//! explains the residual.
 
 use super::{Finding, Quantity, Stage, Units};
 
-/// `e(k) = sum_i a_i e(k-i) + w(k)`, w white: what is left remembers itself, and nothing else.
-///
-/// (E15) in the documentation's theory.
+/// The noise is autoregressive: `e(k) = sum_i a_i e(k-i) + w(k)`, w white.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ColouredNoise {
     /// The output whose noise it is.

@@ -1,26 +1,29 @@
 //! Another measured column that leaks in.
+//!
+//! `y += g L x`, (E13) in the documentation's theory: a measured column x (a temperature, a neighbouring
+//! axis) is added, either directly or through a first-order lag L of unit gain and time constant T, `x_L(k) =
+//! z x_L(k-1) + (1 - z) x(k)`, `z = exp(-Ts / T)`.
+//!
+//! A column that only repeats an input is not proposed.
 
 use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
 use crate::Record;
 
-/// `y += g L x`: a measured column x (a temperature, a neighbouring axis) leaks in, at once or through a
-/// first-order lag L of unit gain and time constant T. A column that only repeats an input is none.
-///
-/// (E13) in the documentation's theory.
+/// Another measured column x is added: `y += g L x`, L a first-order lag of unit gain or none.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Covariate {
-    /// The output that it adds to.
+    /// The output to which it is added.
     pub output: usize,
-    /// Whether it moves the stage, before the output stage, and not only the reading.
+    /// Whether it is a disturbance at the plant's output, before the sensor.
     #[serde(default)]
     pub moves_stage: bool,
-    /// The column's place among the record's covariates.
+    /// The column's index among the record's covariates.
     pub column: usize,
     /// Its name.
     pub label: String,
     /// g, in the output's unit per unit of the column.
     pub gain: f64,
-    /// T in seconds; 0 is at once.
+    /// T in seconds; 0 means without a lag.
     pub time_constant: f64,
     /// A change of g that moves the output by a thousandth of its span.
     pub step: f64,
@@ -75,9 +78,9 @@ impl Covariate {
     }
 }
 
-/// Whether a column says no more than an input does: a reference that the input was made from, a monitor of it.
+/// Whether a column only repeats an input: a reference from which the input was made, or a monitor of it.
 fn follows_an_input(record: &Record, column: usize) -> bool {
-    /// Of the column's squares about its mean, what no multiple of the input explains.
+    /// Largest part of the column's variance that the input leaves unexplained.
     const LEFT: f64 = 1e-3;
     (0..record.inputs().len()).any(|input| {
         let (mut samples, mut sums) = (0.0, [0.0; 5]);
@@ -138,7 +141,7 @@ impl Added for Covariate {
         self.moves_stage = moves_stage;
     }
 
-    /// The lagged column.
+    /// The column behind the lag.
     fn rest(&self, moment: Moment) -> Vec<f64> {
         vec![moment.covariates.get(self.column).copied().unwrap_or(0.0)]
     }

@@ -1,36 +1,41 @@
 //! Slow relaxation driven by v.
+//!
+//! `y += sum_i c_i L_i v`, (E6) in the documentation's theory: first-order lags L_i of unit gain and time
+//! constants T_i in parallel with G. After a step of v the output goes on by c_i within a few T_i. At the
+//! sampling interval Ts,
+//!
+//! ```text
+//! L_i = (1 - z_i) q^-1 / (1 - z_i q^-1),      z_i = exp(-Ts / T_i).
+//! ```
 
 use super::{Block, Coefficients, ParallelSections, Proposal, Quantity, Situation, Stage, Units};
 
-/// `y += sum_i c_i L_i v` with first-order lags L_i of unit gain and time constants T_i: after a step the
-/// output goes on by c_i within a few T_i.
-///
-/// (E6) in the documentation's theory.
+/// The output relaxes after the fast motion: `y += sum_i c_i L_i v` with first-order lags L_i of unit gain.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Creep {
     /// The input whose v drives it.
     pub input: usize,
     /// T_i in seconds.
     pub time_constants: Vec<f64>,
-    /// c_i, fractions of the displacement that v leads to at once.
+    /// c_i, relative to the displacement that follows v without the lags (the DC gain of G is 1).
     pub gains: Vec<f64>,
-    /// Samples by which v arrives late: the dead time of G.
+    /// The delay of v in samples: the dead time of G.
     pub dead_time: usize,
 }
 
-/// Shorter lags, in seconds, are dynamics; so are those that die out within a few samples.
+/// The shortest time constant of creep in seconds: faster lags belong to the dynamics.
 fn shortest(rate: f64) -> f64 {
     const SECONDS: f64 = 0.03;
     const SAMPLES: f64 = 5.0;
     SECONDS.max(SAMPLES / rate)
 }
 
-/// Time constant in samples up to which a lag may be dynamics: a slower one is creep.
+/// The longest time constant of the dynamics in samples: slower lags are creep.
 pub(crate) fn longest_lag(rate: f64) -> f64 {
     shortest(rate) * rate
 }
 
-/// Longer ones are a drift in proportion to the integral of v.
+/// A longer time constant in seconds is a drift proportional to the integral of v.
 const LONGEST: f64 = 3e3;
 
 impl Creep {
@@ -40,7 +45,7 @@ impl Creep {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
 
-    /// One, two and three lags between somewhat more than the shortest and the record's length.
+    /// One, two and three lags between the shortest time constant and the record's length.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const MORE: f64 = 5.0 / 3.0;
         let (low, high) = (MORE * shortest(situation.record.rate()), situation.duration());
@@ -77,7 +82,7 @@ impl Block for Creep {
         times.chain(self.gains.iter().map(|_| 1e-3)).collect()
     }
 
-    /// Creep goes on in one direction, and what is slower than the record is a trend.
+    /// All lags relax in one direction, and none is slower than the record, which would be a trend.
     fn is_plausible(&self, duration: f64) -> bool {
         self.gains.windows(2).all(|pair| pair[0] * pair[1] >= 0.0)
             && self.time_constants.iter().all(|&time| time < duration)

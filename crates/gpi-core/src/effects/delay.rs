@@ -1,19 +1,20 @@
-//! Dead time beyond the linear model's.
+//! A delay of the input beyond the dead time of the linear model.
+//!
+//! `u_d(t) = u(t - T)`, (E1) in the documentation's theory. u is linearly interpolated between samples: with
+//! `T = (n + f)` samples, n whole and `0 <= f < 1`, `u_d(k) = (1 - f) u(k - n) + f u(k - n - 1)`.
 
 use super::{Block, InputStage, Proposal, Quantity, Situation, Stage, Units};
 
-/// `u_d(t) = u(t - T)`: the drive arrives T later; between samples u is a straight line.
-///
-/// (E1) in the documentation's theory.
+/// The drive is the input of T seconds before: `u_d(t) = u(t - T)`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Delay {
-    /// The input that arrives late.
+    /// The input that is delayed.
     pub input: usize,
     /// T times the sampling rate.
     pub samples: f64,
 }
 
-/// A longer dead time is better cut out of the record.
+/// The longest delay in samples. A longer one should be removed from the record.
 const LONGEST: f64 = 100.0;
 
 impl Delay {

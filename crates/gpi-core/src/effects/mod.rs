@@ -1,7 +1,7 @@
 //! The catalogue of effects: what a declared model (envelope, plays, G, white noise) may lack.
 //!
-//! Every effect acts in its own place of the chain, is simulated sample by sample, is saved in model files and
-//! has its parameters estimated together with the rest of the model. To add one, write its file (the
+//! Every effect acts in its own place of the chain, is simulated sample by sample, is saved in model files
+//! and has its parameters estimated together with the rest of the model. To add one, write its file (the
 //! constants that describe it, `proposals`, [`Block`] and the trait of its [`Place`]) and name it with its
 //! place in the catalogue below.
 
@@ -233,5 +233,64 @@ impl Proposal<Effect> {
             effect.set(&values);
         }
         effect
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear::{Section, Sections};
+    use crate::{Channel, Experiment, Matrix, Record};
+
+    /// Calls `ask` with a situation in which every effect but the findings has proposals.
+    fn situation(ask: impl FnOnce(&Situation)) {
+        let signal = |f: fn(f64) -> f64| Matrix::from_fn(1000, 1, |k, _| f(k as f64));
+        let (input, covariates) = (signal(|k| (0.01 * k * k).sin()), signal(|k| (0.03 * k).cos()));
+        let run =
+            Experiment { output: input.clone(), input, covariates, warmup: 0, held_out: vec![] };
+        let channel = |name| vec![Channel::new(name, "")];
+        let signals = [run.input.clone()];
+        let record =
+            Record::new(vec![run], 100.0, channel("u"), channel("y"), channel("x")).unwrap();
+        let (b, c) = (Matrix::from_element(2, 1, 0.1), Matrix::from_row_slice(1, 2, &[1.0, 0.0]));
+        let mode = Section { a: vec![-1.2, 0.6], b, c, reference: 0, beside: None };
+        ask(&Situation {
+            record: &record,
+            drives: &signals,
+            intermediates: &signals,
+            displacements: &signals,
+            residuals: &signals,
+            dynamics: &Sections { sections: vec![mode], ..Sections::default() },
+            loops: Vec::new(),
+            widest: vec![0.5],
+            places: vec![(-1.0, 1.0)],
+        });
+    }
+
+    #[test]
+    fn the_stage_of_every_entry_is_that_of_its_place() {
+        let agrees = |effect: &Effect, entry: &Entry| {
+            assert_eq!((effect.name(), effect.stage()), (entry.name, entry.stage));
+            assert_eq!(serde_json::to_value(effect).unwrap()["name"], entry.name);
+        };
+        situation(|situation| {
+            for entry in CATALOGUE {
+                let found = (entry.proposals)(situation);
+                assert_eq!(found.is_empty(), entry.stage == Stage::Noise, "{}", entry.name);
+                for proposal in found {
+                    agrees(&proposal.block, entry);
+                    if let Some(moved) = proposal.block.elsewhere() {
+                        assert_eq!(moved.stage(), Stage::Displaced);
+                        assert_eq!(moved.elsewhere(), Some(proposal.block));
+                    }
+                }
+            }
+        });
+        let (coefficients, innovation, deviation) = (vec![0.5], 1.0, 1.2);
+        let findings: [Effect; 2] = [
+            Outliers { count: 1, samples: 10, size: 1.0 }.into(),
+            ColouredNoise { output: 0, coefficients, innovation, deviation }.into(),
+        ];
+        findings.iter().for_each(|effect| agrees(effect, effect.entry()));
     }
 }

@@ -1,18 +1,18 @@
 //! Isolated wrong samples.
+//!
+//! Samples that differ from their neighbours by far more than the noise, (E14) in the documentation's theory.
+//! The fit limits their influence by Huber's loss; here they are only counted.
 
 use super::{Finding, Quantity, Stage, Units};
 
-/// Samples that stand apart from their neighbours by far more than the noise; the fit counts them by
-/// Huber's loss.
-///
-/// (E14) in the documentation's theory.
+/// Isolated samples that differ from their neighbours by far more than the noise.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outliers {
-    /// How many there are.
+    /// Their number.
     pub count: usize,
-    /// Of how many samples.
+    /// The number of all samples.
     pub samples: usize,
-    /// Root mean square of what they are off by, in the output's unit.
+    /// Root mean square of their errors, in the output's unit.
     pub size: f64,
 }
 

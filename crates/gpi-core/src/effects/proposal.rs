@@ -27,6 +27,12 @@ impl<B: Block + Clone> Proposal<B> {
         Self { probes: places.into_iter().map(probe).collect(), linear: true, block }
     }
 
+    /// A block to all of whose values the output responds linearly.
+    pub(crate) fn linear_in_all(block: B) -> Self {
+        let count = block.values().len();
+        Self::linear(block, 0..count)
+    }
+
     /// A block that is compared as a whole with its absence.
     pub(crate) fn finite(block: B) -> Self {
         Self { probes: vec![block.clone()], linear: false, block }

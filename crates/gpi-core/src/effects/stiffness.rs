@@ -1,21 +1,29 @@
-//! A resonance that moves with amplitude.
+//! A resonance that moves with the amplitude.
+//!
+//! A restoring force that is not proportional to the displacement acts inside the mechanics, (E7) in the
+//! documentation's theory: `x+ = A x + B v + E w`, `w = law(S x + T v)`, see [`InnerLoop`].
+//!
+//! - Powers of the displacement are Duffing's oscillator (a cube) or a force that differs between the two
+//!   directions (a square).
+//! - Stops are hysteresis inside the loop: the mechanics become softer and more damped as the amplitude
+//!   grows.
+//!
+//! Around several outputs, the signals `S x + T v` are mixtures: of the displacements first, then of what
+//! drives them (see `loop_signals`).
+//!
+//! The values of a loop are its column of E, its rows of S and T, the logarithms of its half-widths and its
+//! weights. The product of E, the scale of the signal and the scale of w is what the output shows; therefore
+//! the largest element of S and T (powers) or the widest half-width and the last weight (stops) are held.
 
 use super::loop_signals::{LoopSignal, Shape, families};
 use super::{
     Block, ClosedLoops, InnerLoop, Law, Proposal, Quantity, Sees, Situation, Stage, Units,
 };
 
-/// Loops around G: a restoring force that is not in proportion to the displacement acts inside the
-/// mechanics, `x+ = A x + B v + E w`, `w = law(S x + T v)`.
-///
-/// Powers of the displacement make Duffing's oscillator (a cube) or directions that differ (a square); stops
-/// make hysteresis inside the loop, which softens the mechanics and damps them as the amplitude grows. Around
-/// several outputs z mixes the states: of the displacements first, then of what drives them.
-///
-/// (E7) in the documentation's theory.
+/// Nonlinear loops around G: `x+ = A x + B v + E w`, `w = law(S x + T v)`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Stiffness {
-    /// At least one.
+    /// The loops, at least one.
     pub loops: Vec<InnerLoop>,
 }
 
@@ -28,7 +36,7 @@ impl Stiffness {
     pub(super) const REPEATS: bool = true;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
-        // A lag has no resonance to move.
+        // a first-order lag has no resonance
         if situation.dynamics.order() < 2 {
             return Vec::new();
         }
@@ -40,7 +48,7 @@ impl Stiffness {
     }
 }
 
-/// A cube of the displacement, and a square beside it.
+/// A cube of the displacement alone, and a cube with a square.
 fn powers(situation: &Situation) -> Vec<Proposal<Stiffness>> {
     let order = situation.dynamics.order();
     // half the span of the displacement
@@ -89,16 +97,16 @@ fn around(
     (!places.is_empty()).then(|| Proposal::linear(block, places))
 }
 
-/// How many values a loop has.
+/// The number of values of a loop.
 fn values_of(inner: &InnerLoop) -> usize {
     Stiffness { loops: vec![inner.clone()] }.values().len()
 }
 
-/// A run of values of a loop.
+/// Values of a loop that have the same form.
 enum Group<'a> {
-    /// As they are.
+    /// The numbers themselves.
     Plain(&'a mut Vec<f64>),
-    /// Positive numbers by their logarithms.
+    /// The logarithms of positive numbers.
     Logarithms(&'a mut Vec<f64>),
 }
 
@@ -156,17 +164,16 @@ impl Block for Stiffness {
                 bounds.extend(free(states.len() + inputs.len()));
                 let largest =
                     seen().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-                // of a power, whose scale is in its drives as well
+                // a power's scale is in its drives as well
                 if let (Some((place, value)), Law::Power { .. }) = (largest, &inner.law) {
                     let first = bounds.len() - seen().count();
                     bounds[first + place] = (value, value);
                 }
             }
             if let Law::Stops { half_widths, weights } = &inner.law {
-                /// Of the logarithms: beyond a thousandth of the widest stop, or a thousand times it, the
-                /// others are stops no longer.
+                /// Largest distance of a half-width from the widest one, in logarithms: a factor of a thousand.
                 const REACH: f64 = 6.9;
-                /// How far a step may take a logarithm or a weight.
+                /// The largest step of a logarithm or a weight.
                 const STEP: f64 = 0.7;
                 let near = |value: f64| (value - STEP, value + STEP);
                 // the widest stop sets the scales of z and of w

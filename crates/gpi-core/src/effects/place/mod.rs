@@ -10,23 +10,18 @@
 //! An effect implements [`Block`] and the trait of its place. A [`Finding`] describes the residual and acts
 //! nowhere.
 
-mod added;
 mod dynamics;
-mod finding;
 mod input;
-mod moment;
 mod output;
 mod plays;
 
-pub use added::Added;
 pub use dynamics::{ClosedLoops, Coefficients, ParallelSections};
-pub use finding::Finding;
 pub use input::InputStage;
-pub use moment::Moment;
-pub use output::{OutputStage, Slope};
+pub use output::{Added, Moment, OutputStage, Slope};
 pub use plays::{PlayCurves, PlayWidths};
 
 use super::block::Block;
+use super::quantity::{Quantity, Units};
 
 /// Where an effect acts, in the order of the signal chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,19 +42,13 @@ pub enum Stage {
     Noise,
 }
 
-impl Stage {
-    /// The word for it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Input => "input",
-            Self::Plays => "plays",
-            Self::Dynamics => "dynamics",
-            Self::Displaced => "displaced",
-            Self::Output => "output",
-            Self::Added => "added",
-            Self::Noise => "noise",
-        }
-    }
+/// A description of the residual. It has no estimated values, and nothing is simulated.
+pub trait Finding {
+    /// The output channel, where it describes one alone.
+    fn output(&self) -> Option<usize>;
+
+    /// What was found, with its units.
+    fn quantities(&self, units: Units) -> Vec<Quantity>;
 }
 
 /// Declares [`Place`] and [`PlaceMut`]: the variant, the trait and the accessor of each block's place.

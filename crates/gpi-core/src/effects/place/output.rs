@@ -1,7 +1,17 @@
-//! The output stage: from the displacement to the sensor's reading.
+//! Behind G: the output stage, and the signals that are added before and after it.
 
-use super::moment::Moment;
 use crate::effects::block::Block;
+
+/// The time of one sample, and the other columns that were measured then.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'a> {
+    /// Seconds since the first sample.
+    pub time: f64,
+    /// Sampling rate in Hz.
+    pub rate: f64,
+    /// The other measured columns.
+    pub covariates: &'a [f64],
+}
 
 /// How a change of the displacement passes to the reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,4 +34,24 @@ pub trait OutputStage: Block {
 
     /// The reading for one sample of the displacement, and how changes pass.
     fn sense(&self, state: &mut [f64], displacement: f64, moment: Moment) -> (f64, Slope);
+}
+
+/// A signal that does not depend on the input.
+pub trait Added: Block {
+    /// The output channel.
+    fn output(&self) -> usize;
+
+    /// Whether it is a disturbance at the plant's output, before the sensor, and not only in the reading.
+    fn moves_stage(&self) -> bool;
+
+    /// Puts it before the output stage (true) or after it.
+    fn set_moves_stage(&mut self, moves_stage: bool);
+
+    /// The state before the first sample.
+    fn rest(&self, _first: Moment) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// The signal at one sample.
+    fn add(&self, state: &mut [f64], moment: Moment) -> f64;
 }
