@@ -4,7 +4,7 @@ use crate::chain::hysteresis::{Beside, Parameters};
 use crate::chain::motion::Motion;
 use crate::chain::point::{Past, Point};
 use crate::chain::stream::hats;
-use crate::effects::{Added, Effect, InnerLoop, Moment, Place, PlayCurves, Stage};
+use crate::effects::{Added, ClosedLoops, Effect, InnerLoop, Moment, Place, PlayCurves, Stage};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::{DVector, RowDVector};
@@ -84,7 +84,7 @@ impl Point {
     /// The loops that effects close around G.
     pub(crate) fn loops(&self) -> impl Iterator<Item = &InnerLoop> {
         let closed = self.effects.iter().filter_map(|effect| effect.place().closed_loops());
-        closed.flat_map(|effect| effect.loops())
+        closed.flat_map(ClosedLoops::loops)
     }
 
     /// The curves through which plays are read.

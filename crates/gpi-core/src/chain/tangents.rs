@@ -3,7 +3,7 @@
 use crate::chain::injections::{Injection, Places, Signals, injections};
 use crate::chain::lanes::{LANES, Lanes, NONE, Weights, add, pass, relax};
 use crate::chain::point::{Layout, Point};
-use crate::effects::{InnerLoop, Sees, Slope};
+use crate::effects::{InnerLoop, OutputStage, Sees, Slope};
 use crate::linear::Section;
 use crate::{Experiment, Matrix};
 use pulp::Simd;
@@ -303,7 +303,7 @@ impl Tile {
 
 /// The output that each effect of the output stage acts on, in the order in which they act.
 pub(super) fn sensed(point: &Point) -> Vec<usize> {
-    let mut sensed: Vec<usize> = point.output_stages().map(|effect| effect.output()).collect();
+    let mut sensed: Vec<usize> = point.output_stages().map(OutputStage::output).collect();
     sensed.sort_unstable();
     sensed
 }

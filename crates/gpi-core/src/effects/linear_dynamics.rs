@@ -82,8 +82,8 @@ impl Block for LinearDynamics {
         }
         // s = rate ln z
         let (radius, angle) = (a2.sqrt(), (-0.5 * a1 / a2.sqrt()).acos());
-        let (decay, swing) = (-radius.ln(), angle);
-        let natural = decay.hypot(swing);
+        let decay = -radius.ln();
+        let natural = decay.hypot(angle);
         vec![
             Quantity::new("frequency", "Hz", self.rate * natural / std::f64::consts::TAU),
             Quantity::new("damping", "", decay / natural),

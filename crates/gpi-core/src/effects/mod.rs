@@ -179,7 +179,7 @@ impl Effect {
     }
 
     /// Takes other values, as many as [`Effect::values`] returns.
-    pub fn set(&mut self, values: &[f64]) {
+    pub(crate) fn set(&mut self, values: &[f64]) {
         if let Some(block) = self.place_mut().block() {
             block.set(values);
         }

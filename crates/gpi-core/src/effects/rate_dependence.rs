@@ -4,9 +4,9 @@
 //! with the speed `s = |du/dt|`. The hysteresis loop opens with the speed: in proportion to the half-width
 //! (a), by the same width for all plays (b), or both.
 //!
-//! `g(s) = s`, or with a [`SpeedLaw`] the transformation of Box and Cox (1964), `g(s) = s_0 ((1 + s/s_0)^e -
-//! 1) / e`. Its slope at s = 0 is 1; beyond the knee s_0 it grows more slowly. The law sees s through a
-//! first-order lag.
+//! `g(s) = s`, or with a [`SpeedLaw`] the transformation of Box and Cox (1964),
+//! `g(s) = s_0 ((1 + s/s_0)^e - 1) / e`. Its slope at s = 0 is 1; beyond the knee s_0 it grows more slowly.
+//! The law sees s through a first-order lag.
 
 use super::{Block, PlayWidths, Proposal, Quantity, Situation, Stage, Units};
 
