@@ -52,7 +52,8 @@ impl Point {
                 half_widths(&values, widest)
             }
             Group::Effect { place } => {
-                let limits = self.effects[place].block().bounds().into_iter().zip(values);
+                let bounds = self.effects[place].block().map_or_else(Vec::new, |own| own.bounds());
+                let limits = bounds.into_iter().zip(values);
                 let limits = limits.map(|((low, high), value)| (low - value, high - value));
                 limits.map(|limits| if freedom.weights { limits } else { HELD }).collect()
             }
@@ -60,8 +61,8 @@ impl Point {
                 let own = &self.dynamics.sections[section];
                 match (own.beside, &values[..]) {
                     (Some(effect), [a1]) => {
-                        let block = self.effects[effect].block();
-                        let (low, high) = block.section_bounds(self.rate);
+                        let own = self.effects[effect].place().parallel_sections();
+                        let (low, high) = own.map_or(FREE, |own| own.section_bounds(self.rate));
                         vec![(low - a1, high - a1)]
                     }
                     _ => vec![FREE; values.len()],
@@ -70,7 +71,7 @@ impl Point {
             Group::Numerator { section } => {
                 let own = &self.dynamics.sections[section];
                 // one input drives the sections of an effect
-                let input = own.beside.map(|effect| self.effects[effect].block().channel());
+                let input = own.beside.and_then(|effect| self.effects[effect].place().input());
                 let is_other = |place: usize| input.is_some_and(|i| i != place / own.order());
                 (0..values.len()).map(|place| held(is_other(place))).collect()
             }

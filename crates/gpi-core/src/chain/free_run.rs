@@ -4,7 +4,7 @@ use crate::chain::hysteresis::{Beside, Parameters};
 use crate::chain::motion::Motion;
 use crate::chain::point::{Past, Point};
 use crate::chain::stream::hats;
-use crate::effects::{Block, Effect, InnerLoop, Moment, Stage};
+use crate::effects::{Added, ClosedLoops, Effect, InnerLoop, Moment, Place, PlayCurves, Stage};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::{DVector, RowDVector};
@@ -21,19 +21,20 @@ impl Point {
 
     /// Effects on the plays of an input.
     pub(crate) fn beside(&self, input: usize) -> Beside<'_> {
-        let own = self.at_stage(Stage::Plays).map(Effect::block);
-        Beside::new(own.filter(|block| block.channel() == input), self.rate)
+        let widths = self.effects.iter().filter_map(|effect| effect.place().play_widths());
+        let widths = widths.filter(|own| own.input() == input);
+        let curves = self.play_curves().filter(|own| own.input() == input);
+        Beside::new(widths, curves, self.rate)
     }
 
     /// The drive (samples, inputs) that reaches the hysteresis.
     pub(crate) fn drive(&self, experiment: &Experiment) -> Matrix {
         let mut drive = experiment.input.clone();
-        for effect in self.at_stage(Stage::Input) {
-            let block = effect.block();
-            let mut column = drive.column_mut(block.channel());
-            let mut state = block.rest(column[0], self.moment(0, &[]));
-            for (k, value) in column.iter_mut().enumerate() {
-                *value = block.drive(&mut state, *value, self.moment(k, &[]));
+        for effect in self.effects.iter().filter_map(|effect| effect.place().input_stage()) {
+            let mut column = drive.column_mut(effect.input());
+            let mut state = effect.rest(column[0]);
+            for value in column.iter_mut() {
+                *value = effect.drive(&mut state, *value, self.rate);
             }
         }
         drive
@@ -82,68 +83,69 @@ impl Point {
 
     /// The loops that effects close around G.
     pub(crate) fn loops(&self) -> impl Iterator<Item = &InnerLoop> {
-        self.at_stage(Stage::Dynamics).flat_map(|effect| effect.block().loops())
+        let closed = self.effects.iter().filter_map(|effect| effect.place().closed_loops());
+        closed.flat_map(ClosedLoops::loops)
     }
 
-    /// Effects that read the plays.
-    pub(crate) fn readers(&self) -> impl Iterator<Item = &Effect> {
-        self.effects.iter().filter(|effect| effect.block().reads())
+    /// The curves through which plays are read.
+    pub(crate) fn play_curves(&self) -> impl Iterator<Item = &dyn PlayCurves> {
+        self.effects.iter().filter_map(|effect| effect.place().play_curves())
     }
 
-    /// Derivatives of v by the values of each effect that reads the plays, (values, samples).
+    /// Derivatives of v by the values of all curves through which plays are read, (values, samples) each.
     pub(crate) fn reading_slopes(&self, drive: &Matrix, past: &Past) -> Vec<Matrix> {
-        let of = |effect: &Effect| self.reading_slopes_of(effect.block(), drive, past);
-        self.readers().map(of).collect()
+        self.play_curves().map(|curves| self.reading_slopes_of(curves, drive, past)).collect()
     }
 
     /// The same of one effect.
-    fn reading_slopes_of(&self, block: &dyn Block, drive: &Matrix, past: &Past) -> Matrix {
-        let input = block.channel();
+    fn reading_slopes_of(&self, curves: &dyn PlayCurves, drive: &Matrix, past: &Past) -> Matrix {
+        let input = curves.input();
         let start = past.plays.as_ref().map(|plays| &plays[input][..]);
         let drive: Vec<f64> = drive.column(input).iter().copied().collect();
-        self.channels[input].reading_slopes(start, self.beside(input), &drive, block)
+        self.channels[input].reading_slopes(start, self.beside(input), &drive, curves)
     }
 
     /// Takes a displacement (samples, outputs) through the output stage.
     pub(crate) fn sense(&self, displacement: &mut Matrix) {
-        for effect in self.at_stage(Stage::Output) {
-            let block = effect.block();
-            let mut column = displacement.column_mut(block.channel());
-            let mut state = block.rest(column[0], self.moment(0, &[]));
+        for effect in self.output_stages() {
+            let mut column = displacement.column_mut(effect.output());
+            let mut state = effect.rest(column[0]);
             for (k, value) in column.iter_mut().enumerate() {
-                *value = block.sense(&mut state, *value, self.moment(k, &[])).0;
+                *value = effect.sense(&mut state, *value, self.moment(k, &[])).0;
             }
         }
     }
 
     /// Adds what the input does not drive, to the displacement or to the reading.
     pub(crate) fn add(&self, stage: Stage, experiment: &Experiment, output: &mut Matrix) {
-        for effect in self.at_stage(stage) {
-            self.add_one(effect.block(), experiment, 1.0, output);
+        for effect in self.effects.iter().filter(|effect| effect.stage() == stage) {
+            if let Place::Added(own) = effect.place() {
+                self.add_one(own, experiment, 1.0, output);
+            }
         }
     }
 
-    /// Adds what one block does, so many times.
-    fn add_one(&self, block: &dyn Block, experiment: &Experiment, times: f64, output: &mut Matrix) {
+    /// Adds one signal, so many times.
+    fn add_one(&self, added: &dyn Added, experiment: &Experiment, times: f64, output: &mut Matrix) {
         let rows = experiment.covariates.transpose();
         let covariates = |k: usize| {
             let width = rows.nrows();
             &rows.as_slice()[k * width..(k + 1) * width]
         };
-        let mut state = block.rest(0.0, self.moment(0, covariates(0)));
-        for (k, value) in output.column_mut(block.channel()).iter_mut().enumerate() {
-            *value += times * block.add(&mut state, self.moment(k, covariates(k)));
+        let mut state = added.rest(self.moment(0, covariates(0)));
+        for (k, value) in output.column_mut(added.output()).iter_mut().enumerate() {
+            *value += times * added.add(&mut state, self.moment(k, covariates(k)));
         }
     }
 
     /// Whether the model has an output stage.
     pub(crate) fn senses(&self) -> bool {
-        self.at_stage(Stage::Output).next().is_some()
+        self.output_stages().next().is_some()
     }
 
-    /// Whether what a block does is added to the reading as it is, whatever the rest of the model does.
-    fn is_apart(&self, block: &dyn Block) -> bool {
-        block.stage() == Stage::Added || (block.stage() == Stage::Displaced && !self.senses())
+    /// The signal that an effect adds to the reading as it is, whatever the rest of the model does.
+    fn apart<'a>(&self, effect: &'a Effect) -> Option<&'a dyn Added> {
+        effect.place().added().filter(|added| !added.moves_stage() || !self.senses())
     }
 
     /// What the output gains by a block beside this point's own; `here` is the output.
@@ -155,14 +157,13 @@ impl Point {
         experiment: &Experiment,
         index: usize,
     ) -> Result<Matrix, Error> {
-        let block = effect.block();
-        if self.is_apart(block) {
+        if let Some(added) = self.apart(effect) {
             let mut gained = Matrix::zeros(here.nrows(), here.ncols());
-            self.add_one(block, experiment, 1.0, &mut gained);
+            self.add_one(added, experiment, 1.0, &mut gained);
             return Ok(gained);
         }
         let point = self.with_effect(effect.clone());
-        Ok(point.output_from(block.stage(), known, experiment, index)? - here)
+        Ok(point.output_from(effect.stage(), known, experiment, index)? - here)
     }
 
     /// The signals along the chain.
@@ -208,14 +209,15 @@ impl Point {
         experiment: &Experiment,
         index: usize,
     ) -> Result<Vec<Vec<Matrix>>, Error> {
-        let streams = |block: &dyn Block| block.reads() || !block.loops().is_empty();
-        if self.effects.iter().all(|effect| streams(effect.block())) {
+        let streams =
+            |effect: &Effect| matches!(effect.place(), Place::Curves(_) | Place::Loops(_));
+        if self.effects.iter().all(streams) {
             return Ok(vec![Vec::new(); self.effects.len()]);
         }
         let known = self.signals(experiment, index)?;
         let here = self.output_from(Stage::Added, &known, experiment, index)?;
         let of = |(place, effect): (usize, &Effect)| {
-            if streams(effect.block()) {
+            if streams(effect) {
                 return Ok(Vec::new());
             }
             self.columns_of(place, &known, &here, experiment, index)
@@ -232,14 +234,15 @@ impl Point {
         experiment: &Experiment,
         index: usize,
     ) -> Result<Vec<Matrix>, Error> {
-        let block = self.effects[place].block();
-        if !block.sections(self.rate).is_empty() {
+        let effect = &self.effects[place];
+        let Some(block) = effect.block() else { return Ok(Vec::new()) };
+        if let Place::Parallel(_) = effect.place() {
             return Ok(Vec::new());
         }
         let steps = block.steps();
-        if block.reads() {
-            let input = block.channel();
-            let slopes = self.reading_slopes_of(block, &known.drive, &self.pasts[index]);
+        if let Place::Curves(curves) = effect.place() {
+            let input = curves.input();
+            let slopes = self.reading_slopes_of(curves, &known.drive, &self.pasts[index]);
             let column = |(step, slope): (f64, nalgebra::RowDVector<f64>)| {
                 let mut moved = known.clone();
                 moved.intermediate.column_mut(input).axpy(step, &slope.transpose(), 1.0);
@@ -253,15 +256,15 @@ impl Point {
             let mut values = block.values();
             values[number] += step;
             let mut moved = self.clone();
-            moved.effects[place].block_mut().set(&values);
-            if self.is_apart(block) {
+            moved.effects[place].set(&values);
+            let apart = self.apart(&moved.effects[place]).zip(self.apart(effect));
+            if let Some((changed, own)) = apart {
                 let mut column = Matrix::zeros(here.nrows(), here.ncols());
-                let moved = moved.effects[place].block();
-                self.add_one(moved, experiment, 1.0 / step, &mut column);
-                self.add_one(block, experiment, -1.0 / step, &mut column);
+                self.add_one(changed, experiment, 1.0 / step, &mut column);
+                self.add_one(own, experiment, -1.0 / step, &mut column);
                 return Ok(column);
             }
-            let there = moved.output_from(block.stage(), known, experiment, index)?;
+            let there = moved.output_from(effect.stage(), known, experiment, index)?;
             Ok((there - here) / step)
         };
         steps.into_iter().enumerate().map(column).collect()

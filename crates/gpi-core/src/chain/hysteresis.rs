@@ -1,6 +1,6 @@
 //! The output of one hysteresis and its derivatives, streamed sample by sample.
 
-use crate::effects::{Block, Moment};
+use crate::effects::{PlayCurves, PlayWidths};
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading, play};
 use crate::{Hysteresis, Matrix};
 use std::ops::Range;
@@ -95,20 +95,20 @@ impl Parameters {
         });
     }
 
-    /// Derivatives of v by the values of a block that reads the plays, (values, samples).
+    /// Derivatives of v by the values of curves through which the plays are read, (values, samples).
     pub(crate) fn reading_slopes(
         &self,
         start: Option<&[f64]>,
         beside: Beside,
         u: &[f64],
-        block: &dyn Block,
+        curves: &dyn PlayCurves,
     ) -> Matrix {
-        let mut slopes = Matrix::zeros(block.values().len(), u.len());
+        let mut slopes = Matrix::zeros(curves.values().len(), u.len());
         let mut k = 0;
         self.run(start, beside, u, &mut |plays, _| {
             let mut column = slopes.column_mut(k);
             for ((&place, &r), &weight) in plays.iter().zip(&self.half_widths).zip(&self.weights) {
-                block.read_slopes(r, place, weight, column.as_mut_slice());
+                curves.read_slopes(r, place, weight, column.as_mut_slice());
             }
             k += 1;
         });
@@ -144,50 +144,54 @@ impl Parameters {
 /// Effects that act on the plays of one input.
 #[derive(Clone, Default)]
 pub(crate) struct Beside<'a> {
-    blocks: Vec<Playing<'a>>,
+    widths: Vec<Widening<'a>>,
+    curves: Vec<&'a dyn PlayCurves>,
     /// Sampling rate in Hz.
     rate: f64,
 }
 
-/// An effect, what it remembers, and what half-widths grow with at the present sample.
+/// An effect on half-widths, its state, and the quantity that they grow with at the present sample.
 #[derive(Clone)]
-struct Playing<'a> {
-    block: &'a dyn Block,
+struct Widening<'a> {
+    effect: &'a dyn PlayWidths,
     memory: Vec<f64>,
     speed_seen: f64,
 }
 
 impl<'a> Beside<'a> {
-    pub(crate) fn new(blocks: impl Iterator<Item = &'a dyn Block>, rate: f64) -> Self {
-        let still = Moment { time: 0.0, rate, covariates: &[] };
-        let resting = |block: &'a dyn Block| Playing {
-            block,
-            memory: block.rest(0.0, still),
+    pub(crate) fn new(
+        widths: impl Iterator<Item = &'a dyn PlayWidths>,
+        curves: impl Iterator<Item = &'a dyn PlayCurves>,
+        rate: f64,
+    ) -> Self {
+        let resting = |effect: &'a dyn PlayWidths| Widening {
+            effect,
+            memory: effect.rest(),
             speed_seen: 0.0,
         };
-        Self { blocks: blocks.map(resting).collect(), rate }
+        Self { widths: widths.map(resting).collect(), curves: curves.collect(), rate }
     }
 
     /// Takes |du/dt| in; at the first sample the input stands.
     fn speed_seen(&mut self, previous: Option<f64>, u: f64) {
         let speed = previous.map_or(0.0, |previous| (u - previous).abs() * self.rate);
-        for Playing { block, memory, speed_seen } in &mut self.blocks {
-            *speed_seen = block.speed_seen(memory, speed, self.rate);
+        for Widening { effect, memory, speed_seen } in &mut self.widths {
+            *speed_seen = effect.speed_seen(memory, speed, self.rate);
         }
     }
 
     /// A play's half-width, and its derivative by the half-width at rest.
     fn width(&self, half_width: f64) -> (f64, f64) {
-        self.blocks.iter().fold((half_width, 1.0), |(width, slope), playing| {
-            let (width, own) = playing.block.width(width, playing.speed_seen);
+        self.widths.iter().fold((half_width, 1.0), |(width, slope), widening| {
+            let (width, own) = widening.effect.width(width, widening.speed_seen);
             (width, slope * own)
         })
     }
 
     /// What a play's place is read as, and the derivative.
     fn read(&self, half_width: f64, place: f64) -> (f64, f64) {
-        self.blocks.iter().fold((place, 1.0), |(place, slope), playing| {
-            let (place, own) = playing.block.read(half_width, place);
+        self.curves.iter().fold((place, 1.0), |(place, slope), curves| {
+            let (place, own) = curves.read(half_width, place);
             (place, slope * own)
         })
     }
@@ -276,7 +280,7 @@ impl<'a> Sensitivity<'a> {
             parameters,
             wanted,
             columns: Columns::new(parameters, wanted),
-            curved: beside.blocks.iter().any(|playing| playing.block.reads()),
+            curved: !beside.curves.is_empty(),
             beside,
             previous: None,
             start,

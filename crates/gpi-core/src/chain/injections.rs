@@ -4,7 +4,7 @@ use super::hysteresis::{Columns, Derivatives};
 use super::point::Point;
 use super::table::{Group, Table};
 use crate::Matrix;
-use crate::effects::{InnerLoop, Law, Sees};
+use crate::effects::{InnerLoop, Law, Place, Sees};
 use crate::linear::Section;
 use std::ops::Range;
 
@@ -57,7 +57,7 @@ impl Signals {
         let hysteresis: Vec<Columns> =
             point.channels.iter().map(|channel| Columns::new(channel, wanted)).collect();
         let columns = hysteresis.iter().map(|own| take(own.len)).collect();
-        let reading = point.readers().map(|effect| effect.block().values().len());
+        let reading = point.play_curves().map(|curves| curves.values().len());
         let readings = reading.map(&mut take).collect();
         let states = take(point.dynamics.order());
         let loops = point.loops().map(|inner| take(1 + inner.law.stops())).collect();
@@ -198,18 +198,23 @@ impl Entries<'_> {
 
     fn effect(&mut self, place: usize, unknowns: Range<usize>) {
         let before = &self.point.effects[..place];
-        let block = self.point.effects[place].block();
-        if block.reads() {
-            let number = before.iter().filter(|effect| effect.block().reads()).count();
-            let v = self.places.v.start + block.channel();
-            for (unknown, signal) in unknowns.clone().zip(self.signals.readings[number].clone()) {
-                self.add(unknown, v, signal, 1.0);
+        match self.point.effects[place].place() {
+            Place::Curves(curves) => {
+                let others = before.iter().filter_map(|effect| effect.place().play_curves());
+                let (number, v) = (others.count(), self.places.v.start + curves.input());
+                for (unknown, signal) in unknowns.zip(self.signals.readings[number].clone()) {
+                    self.add(unknown, v, signal, 1.0);
+                }
             }
-        }
-        let number: usize = before.iter().map(|effect| effect.block().loops().len()).sum();
-        let mut first = unknowns.start;
-        for (inner, number) in block.loops().iter().zip(number..) {
-            first = self.around(inner, number, first);
+            Place::Loops(closed) => {
+                let others = before.iter().filter_map(|effect| effect.place().closed_loops());
+                let number: usize = others.map(|other| other.loops().len()).sum();
+                let mut first = unknowns.start;
+                for (inner, number) in closed.loops().iter().zip(number..) {
+                    first = self.around(inner, number, first);
+                }
+            }
+            _ => {}
         }
     }
 

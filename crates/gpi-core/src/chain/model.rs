@@ -1,6 +1,9 @@
 //! A model's chain with its effects, a block of samples at a time.
 
-use crate::effects::{Block, Effect, InnerLoop, Moment, Quantity, Stage, Units};
+use crate::effects::{
+    ClosedLoops, Effect, InnerLoop, Moment, ParallelSections, Place, PlayCurves, Quantity, Stage,
+    Units,
+};
 use crate::linear::advance;
 use crate::model::{Model, ModelState};
 use crate::operators::{GpiState, Operator, play};
@@ -42,34 +45,32 @@ impl Model {
 
     /// What an engineer would call an effect's parameters, with the units of this model's channels.
     pub fn quantities(&self, effect: &Effect) -> Vec<Quantity> {
-        let block = effect.block();
+        let place = effect.place();
+        let channel = place.input().or(place.output()).unwrap_or(0);
         let unit = |channels: &'_ [Channel]| {
-            let own = channels.get(block.channel()).or(channels.first());
+            let own = channels.get(channel).or(channels.first());
             own.map_or(String::new(), |channel| channel.unit.clone())
         };
         let (input, output) = (unit(self.inputs()), unit(self.outputs()));
-        block.quantities(Units { input: &input, output: &output })
+        effect.quantities(Units { input: &input, output: &output })
     }
 
     pub(crate) fn validate_effects(&self) -> Result<(), Error> {
         for effect in &self.effects {
-            let block = effect.block();
-            let channels = match block.stage() {
-                Stage::Input | Stage::Plays => self.inputs().len(),
-                Stage::Dynamics if !block.sections(1.0).is_empty() => self.inputs().len(),
-                _ => self.outputs().len(),
-            };
+            let place = effect.place();
+            let (inputs, outputs) = (self.inputs().len(), self.outputs().len());
             let requirement = |what: String| Error::parameter("effects", effect.name(), what);
-            if block.channel() >= channels {
-                let what = format!("acts on channel {} of {channels}", block.channel());
-                return Err(requirement(what));
+            for (channel, channels) in [(place.input(), inputs), (place.output(), outputs)] {
+                if let Some(channel) = channel.filter(|&channel| channel >= channels) {
+                    return Err(requirement(format!("acts on channel {channel} of {channels}")));
+                }
             }
-            for inner in block.loops() {
-                let (states, inputs) = (self.linear().order(), self.inputs().len());
-                if let Some(flaw) = inner.flaw(states, inputs, self.outputs().len()) {
+            for inner in place.closed_loops().map_or(&[][..], ClosedLoops::loops) {
+                if let Some(flaw) = inner.flaw(self.linear().order(), inputs, outputs) {
                     return Err(requirement(flaw));
                 }
             }
+            let Some(block) = effect.block() else { continue };
             if block.values().iter().any(|value| !value.is_finite()) {
                 return Err(requirement("its values must be finite".to_owned()));
             }
@@ -86,51 +87,52 @@ impl Model {
 
     /// What the effects remember of an input and a v that have stood.
     pub(crate) fn rest_effects(&self, state: &mut ModelState, input: &[f64], v: &DVector<f64>) {
-        let rest = |effect: &Effect| {
-            let block = effect.block();
-            match block.stage() {
-                Stage::Input => block.rest(input[block.channel()], self.moment(0, &[])),
-                Stage::Plays => block.rest(0.0, self.moment(0, &[])),
-                Stage::Dynamics => standing(block, v, self.rate()),
-                // the first sample tells
-                _ => Vec::new(),
-            }
+        let rest = |effect: &Effect| match effect.place() {
+            Place::Input(own) => own.rest(input[own.input()]),
+            Place::Widths(own) => own.rest(),
+            Place::Parallel(own) => standing(own, v, self.rate()),
+            // the first sample tells
+            _ => Vec::new(),
         };
         state.effects = self.effects.iter().map(rest).collect();
     }
 
-    fn at_stage<'a>(
+    /// The effects that `choose` selects, with their states.
+    fn at<'a, T>(
         &'a self,
         states: &'a mut [Vec<f64>],
-        stage: Stage,
-    ) -> impl Iterator<Item = (&'a dyn Block, &'a mut Vec<f64>)> {
-        let pairs = self.effects.iter().map(Effect::block).zip(states);
-        pairs.filter(move |(block, _)| block.stage() == stage)
+        choose: impl Fn(Place<'a>) -> Option<T>,
+    ) -> impl Iterator<Item = (T, &'a mut Vec<f64>)> {
+        let pairs = self.effects.iter().zip(states);
+        pairs.filter_map(move |(effect, state)| Some((choose(effect.place())?, state)))
     }
 
     /// The drive that reaches the hysteresis.
     pub(crate) fn drive_from(&self, state: &mut ModelState, input: &Matrix) -> Matrix {
         let mut drive = input.clone();
-        let first = state.sample;
-        for (block, memory) in self.at_stage(&mut state.effects, Stage::Input) {
-            for (k, value) in drive.column_mut(block.channel()).iter_mut().enumerate() {
-                *value = block.drive(memory, *value, self.moment(first + k, &[]));
+        for (effect, memory) in self.at(&mut state.effects, Place::input_stage) {
+            for value in drive.column_mut(effect.input()).iter_mut() {
+                *value = effect.drive(memory, *value, self.rate());
             }
         }
         drive
     }
 
+    /// The curves through which the plays of an input are read.
+    fn play_curves(&self, input: usize) -> Vec<&dyn PlayCurves> {
+        let curves = self.effects.iter().filter_map(|effect| effect.place().play_curves());
+        curves.filter(|own| own.input() == input).collect()
+    }
+
     /// What plays that stand are read as; `v` without effects.
     pub(crate) fn read_plays(&self, input: usize, state: &GpiState<f64, Vec<f64>>, v: f64) -> f64 {
-        let effects = self.effects.iter().map(Effect::block);
-        let blocks: Vec<&dyn Block> =
-            effects.filter(|block| block.reads() && block.channel() == input).collect();
-        if blocks.is_empty() {
+        let curves = self.play_curves(input);
+        if curves.is_empty() {
             return v;
         }
         let bank = self.hysteresis()[input].plays();
         let plays = bank.half_widths().iter().zip(bank.weights()).zip(state.plays.plays());
-        let read = |r, place| blocks.iter().fold(place, |place, block| block.read(r, place).0);
+        let read = |r, place| curves.iter().fold(place, |place, own| own.read(r, place).0);
         plays.map(|((&r, weight), &place)| weight * read(r, place)).sum()
     }
 
@@ -143,16 +145,10 @@ impl Model {
         signal: &mut [f64],
     ) -> Result<(), Error> {
         let hysteresis = &self.hysteresis()[input];
-        let acts = |block: &dyn Block| block.stage() == Stage::Plays && block.channel() == input;
-        let mut blocks: Vec<(&dyn Block, &mut Vec<f64>, f64)> = self
-            .effects
-            .iter()
-            .map(Effect::block)
-            .zip(memories)
-            .filter(|(block, _)| acts(*block))
-            .map(|(block, memory)| (block, memory, 0.0))
-            .collect();
-        if blocks.is_empty() {
+        let curves = self.play_curves(input);
+        let widths = self.at(memories, Place::play_widths).filter(|(own, _)| own.input() == input);
+        let mut widths: Vec<_> = widths.map(|(own, memory)| (own, memory, 0.0)).collect();
+        if widths.is_empty() && curves.is_empty() {
             hysteresis.in_place(state, signal);
             return Ok(());
         }
@@ -160,18 +156,18 @@ impl Model {
         let mut places = state.plays.plays().to_vec();
         for value in signal {
             let speed = (*value - state.envelope.previous).abs() * self.rate();
-            for (block, memory, speed_seen) in &mut blocks {
-                *speed_seen = block.speed_seen(memory, speed, self.rate());
+            for (own, memory, speed_seen) in &mut widths {
+                *speed_seen = own.speed_seen(memory, speed, self.rate());
             }
             let z = envelope.step(&mut state.envelope, *value);
             *value = 0.0;
             let plays = bank.half_widths().iter().zip(bank.weights()).zip(&mut places);
             for ((&r, weight), place) in plays {
-                let width = blocks
+                let width = widths
                     .iter()
-                    .fold(r, |width, (block, _, speed_seen)| block.width(width, *speed_seen).0);
+                    .fold(r, |width, (own, _, speed_seen)| own.width(width, *speed_seen).0);
                 *place = play(width, z, *place);
-                let read = blocks.iter().fold(*place, |place, (block, ..)| block.read(r, place).0);
+                let read = curves.iter().fold(*place, |place, own| own.read(r, place).0);
                 *value += weight * read;
             }
         }
@@ -181,24 +177,21 @@ impl Model {
 
     /// G and what stands beside it and in its loop.
     pub(crate) fn respond_from(&self, state: &mut ModelState, v: &Matrix) -> Result<Matrix, Error> {
-        let blocks = self.effects.iter().map(Effect::block);
-        let loops: Vec<&InnerLoop> = blocks.flat_map(Block::loops).collect();
+        let has_loops = self.effects.iter().any(|effect| effect.place().closed_loops().is_some());
         let linear = self.linear();
-        let mut output = if loops.is_empty() {
+        let mut output = if !has_loops {
             linear.simulate_from(&mut state.linear, v)?
         } else {
             Matrix::zeros(v.nrows(), linear.outputs())
         };
         let rate = self.rate();
-        for (block, memory) in self.at_stage(&mut state.effects, Stage::Dynamics) {
+        for (own, memory) in self.at(&mut state.effects, Place::parallel_sections) {
             let mut column = output.column_mut(0);
-            for (value, &v) in
-                column.iter_mut().zip(v.column(block.channel().min(v.ncols() - 1)).iter())
-            {
-                *value += beside(block, memory, v, rate);
+            for (value, &v) in column.iter_mut().zip(v.column(own.input()).iter()) {
+                *value += beside(own, memory, v, rate);
             }
         }
-        if !loops.is_empty() {
+        if has_loops {
             self.circulate(state, v, &mut output);
         }
         Ok(output)
@@ -207,14 +200,13 @@ impl Model {
     /// Adds what G makes of v with its loops closed.
     fn circulate(&self, state: &mut ModelState, v: &Matrix, output: &mut Matrix) {
         let linear = self.linear();
-        let blocks = self.effects.iter().map(Effect::block).zip(&mut state.effects);
         let mut loops: Vec<(&InnerLoop, &mut [f64])> = Vec::new();
-        for (block, memory) in blocks.filter(|(block, _)| !block.loops().is_empty()) {
-            memory.resize(block.loops().iter().map(|inner| inner.law.stops()).sum(), 0.0);
+        for (own, memory) in self.at(&mut state.effects, Place::closed_loops) {
+            memory.resize(own.loops().iter().map(|inner| inner.law.stops()).sum(), 0.0);
             let mut rest = &mut memory[..];
-            for inner in block.loops() {
-                let (own, others) = rest.split_at_mut(inner.law.stops());
-                loops.push((inner, own));
+            for inner in own.loops() {
+                let (places, others) = rest.split_at_mut(inner.law.stops());
+                loops.push((inner, places));
                 rest = others;
             }
         }
@@ -247,13 +239,13 @@ impl Model {
     ) {
         let first = state.sample;
         self.add_from(Stage::Displaced, state, output, covariates);
-        for (block, memory) in self.at_stage(&mut state.effects, Stage::Output) {
-            let mut column = output.column_mut(block.channel());
+        for (effect, memory) in self.at(&mut state.effects, Place::output_stage) {
+            let mut column = output.column_mut(effect.output());
             if memory.is_empty() {
-                *memory = block.rest(column[0], self.moment(0, &[]));
+                *memory = effect.rest(column[0]);
             }
             for (k, value) in column.iter_mut().enumerate() {
-                *value = block.sense(memory, *value, self.moment(first + k, &[])).0;
+                *value = effect.sense(memory, *value, self.moment(first + k, &[])).0;
             }
         }
         self.add_from(Stage::Added, state, output, covariates);
@@ -270,26 +262,24 @@ impl Model {
         let rows = covariates.transpose();
         let width = rows.nrows();
         let at = |k: usize| &rows.as_slice()[k * width..(k + 1) * width];
-        for (block, memory) in self.at_stage(&mut state.effects, stage) {
+        let moves_stage = stage == Stage::Displaced;
+        let added = self.at(&mut state.effects, Place::added);
+        for (effect, memory) in added.filter(|(effect, _)| effect.moves_stage() == moves_stage) {
             if memory.is_empty() {
-                *memory = block.rest(0.0, self.moment(0, at(0)));
+                *memory = effect.rest(self.moment(0, at(0)));
             }
-            for (k, value) in output.column_mut(block.channel()).iter_mut().enumerate() {
-                *value += block.add(memory, self.moment(first + k, at(k)));
+            for (k, value) in output.column_mut(effect.output()).iter_mut().enumerate() {
+                *value += effect.add(memory, self.moment(first + k, at(k)));
             }
         }
     }
 }
 
 /// The delay line and the states of a block's sections after v has stood.
-fn standing(block: &dyn Block, v: &DVector<f64>, rate: f64) -> Vec<f64> {
-    let sections = block.sections(rate);
-    if sections.is_empty() {
-        return Vec::new();
-    }
-    let v = v[block.channel()];
-    let mut states = vec![v; block.dead_time()];
-    for (a, b) in sections {
+fn standing(own: &dyn ParallelSections, v: &DVector<f64>, rate: f64) -> Vec<f64> {
+    let v = v[own.input()];
+    let mut states = vec![v; own.dead_time()];
+    for (a, b) in own.sections(rate) {
         match a[..] {
             [a1, a2] => {
                 let x1 = (b[0] + b[1]) * v / (1.0 + a1 + a2);
@@ -302,8 +292,8 @@ fn standing(block: &dyn Block, v: &DVector<f64>, rate: f64) -> Vec<f64> {
 }
 
 /// One sample of a block's sections in observer form.
-fn beside(block: &dyn Block, memory: &mut [f64], v: f64, rate: f64) -> f64 {
-    let (line, states) = memory.split_at_mut(block.dead_time());
+fn beside(effect: &dyn ParallelSections, memory: &mut [f64], v: f64, rate: f64) -> f64 {
+    let (line, states) = memory.split_at_mut(effect.dead_time());
     let mut delayed = v;
     if let Some(last) = line.last().copied() {
         line.rotate_right(1);
@@ -311,7 +301,7 @@ fn beside(block: &dyn Block, memory: &mut [f64], v: f64, rate: f64) -> f64 {
         delayed = last;
     }
     let (mut sum, mut first) = (0.0, 0);
-    for (a, b) in block.sections(rate) {
+    for (a, b) in effect.sections(rate) {
         let own = &mut states[first..first + a.len()];
         sum += own[0];
         advance(&a, own, |state| b[state] * delayed);

@@ -2,7 +2,7 @@
 
 use crate::Matrix;
 use crate::chain::hysteresis::{Derivatives, Parameters};
-use crate::effects::{Effect, Stage};
+use crate::effects::{Effect, OutputStage, PlaceMut};
 use crate::linear::Sections;
 use nalgebra::DVector;
 
@@ -63,10 +63,10 @@ impl Point {
     /// The point with one more effect, in its place of the chain.
     pub(crate) fn with_effect(&self, effect: Effect) -> Self {
         let mut point = self.clone();
-        let stage = |effect: &Effect| effect.block().stage();
-        let place = point.effects.partition_point(|other| stage(other) <= stage(&effect));
-        let sections = effect.block().sections(point.rate);
-        let input = effect.block().channel();
+        let place = point.effects.partition_point(|other| other.stage() <= effect.stage());
+        let parallel = effect.place().parallel_sections();
+        let parallel = parallel.map(|own| (own.input(), own.sections(point.rate)));
+        let (input, sections) = parallel.unwrap_or_default();
         point.effects.insert(place, effect);
         for section in &mut point.dynamics.sections {
             section.beside = section.beside.map(|own| if own >= place { own + 1 } else { own });
@@ -110,21 +110,22 @@ impl Point {
     pub(crate) fn blocks(&self) -> Vec<Effect> {
         let mut effects = self.effects.clone();
         for (place, effect) in effects.iter_mut().enumerate() {
-            let input = effect.block().channel();
+            let PlaceMut::Parallel(effect) = effect.place_mut() else { continue };
+            let input = effect.input();
             let own = self.dynamics.sections.iter().filter(|s| s.beside == Some(place));
             let sections: Vec<_> = own
                 .map(|s| (s.a.clone(), s.b.column(input).iter().copied().collect::<Vec<_>>()))
                 .collect();
             if !sections.is_empty() {
                 let dead_time = self.dynamics.delay;
-                effect.block_mut().set_sections(&sections, dead_time, self.rate);
+                effect.set_sections(&sections, dead_time, self.rate);
             }
         }
         effects
     }
 
-    /// The effects of a stage.
-    pub(crate) fn at_stage(&self, stage: Stage) -> impl Iterator<Item = &Effect> {
-        self.effects.iter().filter(move |effect| effect.block().stage() == stage)
+    /// The effects of the output stage.
+    pub(crate) fn output_stages(&self) -> impl Iterator<Item = &dyn OutputStage> {
+        self.effects.iter().filter_map(|effect| effect.place().output_stage())
     }
 }

@@ -155,7 +155,7 @@ impl Group {
             Feedthrough { input, output } => {
                 dynamics != DynamicsFreedom::Nothing && point.dynamics.held[input].0 != output
             }
-            Effect { place } => point.effects[place].block().sections(1.0).is_empty(),
+            Effect { place } => point.effects[place].place().parallel_sections().is_none(),
             Plays { experiment, .. } => {
                 derivatives.starts && point.pasts[experiment].plays.is_some()
             }
@@ -174,7 +174,7 @@ impl Group {
             Numerator { section } => point.dynamics.sections[section].b.as_slice().to_vec(),
             Observer { section } => point.dynamics.sections[section].c.as_slice().to_vec(),
             Feedthrough { input, output } => vec![point.dynamics.d[(output, input)]],
-            Effect { place } => point.effects[place].block().values(),
+            Effect { place } => point.effects[place].values(),
             Offsets { experiment } => point.offsets[experiment].as_slice().to_vec(),
             Plays { experiment, input } => {
                 let plays = point.pasts[experiment].plays.as_ref();
@@ -206,7 +206,7 @@ impl Group {
             Effect { place } => {
                 let mut values = self.read(point);
                 add(&mut values);
-                point.effects[place].block_mut().set(&values);
+                point.effects[place].set(&values);
             }
             Offsets { experiment } => add(point.offsets[experiment].as_mut_slice()),
             Plays { experiment, input } => {

@@ -4,7 +4,7 @@ use super::injections::{Injection, Places, Signals, injections};
 use super::lanes::{LANES, Lanes, NONE, Weights, add, pass, relax};
 use super::point::Point;
 use super::table::{Group, Table};
-use crate::effects::{InnerLoop, Sees, Slope, Stage};
+use crate::effects::{InnerLoop, OutputStage, Sees, Slope};
 use crate::linear::Section;
 use crate::{Experiment, Matrix};
 use pulp::Simd;
@@ -304,8 +304,7 @@ impl Tile {
 
 /// The output that each effect of the output stage acts on, in the order in which they act.
 pub(super) fn sensed(point: &Point) -> Vec<usize> {
-    let effects = point.at_stage(Stage::Output);
-    let mut sensed: Vec<usize> = effects.map(|effect| effect.block().channel()).collect();
+    let mut sensed: Vec<usize> = point.output_stages().map(OutputStage::output).collect();
     sensed.sort_unstable();
     sensed
 }

@@ -17,7 +17,7 @@ impl Model {
     pub(super) fn quasi_static(&self) -> Result<Self, Error> {
         let mut still = self.clone();
         // loops act on the states of G, which are gone
-        still.effects.retain(|effect| effect.block().loops().is_empty());
+        still.effects.retain(|effect| effect.place().closed_loops().is_none());
         still.linear = StateSpace::delayed_gain(&self.linear().dc_gain()?, 0);
         Ok(still)
     }

@@ -7,7 +7,7 @@ mod plays;
 mod solve;
 mod streaming;
 
-use crate::effects::{Effect, Stage};
+use crate::effects::{Effect, InputStage};
 use crate::{Error, Experiment, Matrix, Model, Record, SimulationError};
 use dynamics::Backward;
 use std::cmp::Ordering;
@@ -168,7 +168,7 @@ impl Model {
                 left.push((effect.name(), "the input does not drive it"));
             } else if is_added(effect) {
                 left.push((effect.name(), "the column that drives it is not known beforehand"));
-            } else if effect.block().fastest().is_finite() {
+            } else if effect.place().input_stage().is_some_and(is_limited) {
                 left.push((effect.name(), "the drive is kept below its limit instead"));
             } else {
                 compensated.push(effect.name());
@@ -257,9 +257,14 @@ impl Model {
     }
 }
 
+/// Whether it limits the slope of the drive.
+fn is_limited(effect: &dyn InputStage) -> bool {
+    effect.fastest().is_finite()
+}
+
 /// Whether it comes on top of what the input does.
 fn is_added(effect: &Effect) -> bool {
-    matches!(effect.block().stage(), Stage::Added | Stage::Displaced)
+    effect.place().added().is_some()
 }
 
 struct Found {

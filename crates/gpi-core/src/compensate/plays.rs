@@ -1,7 +1,7 @@
 //! The hysteresis undone: by its exact inverse, or sample by sample where effects act on its plays.
 
 use super::solve::zero_of;
-use crate::effects::{Block, Stage};
+use crate::effects::{Effect, Stage};
 use crate::operators::{GpiState, Operator};
 use crate::{Error, Matrix, Model, ModelState};
 
@@ -14,9 +14,11 @@ pub(super) fn undone(
     let (mut drive, mut out_of_reach) = (v.clone(), 0);
     for (input, (mut column, &limits)) in drive.column_iter_mut().zip(limits).enumerate() {
         let hysteresis = &model.hysteresis()[input];
-        let acts = |block: &dyn Block| block.stage() == Stage::Plays && block.channel() == input;
+        let acts = |effect: &Effect| {
+            effect.stage() == Stage::Plays && effect.place().input() == Some(input)
+        };
         let inverse = hysteresis.inverse_within(limits[0], limits[1])?;
-        if model.effects().iter().any(|effect| acts(effect.block())) {
+        if model.effects().iter().any(acts) {
             out_of_reach += follow(model, input, column.as_mut_slice(), inverse.drive())?;
         } else {
             let mut state = inverse.rest();

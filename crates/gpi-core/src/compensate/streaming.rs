@@ -1,6 +1,6 @@
 //! The compensator that runs beside an actuator, one sample at a time.
 
-use crate::effects::{Effect, Stage};
+use crate::effects::{Effect, Place, Stage};
 use crate::operators::{Compensator, Lags};
 use crate::{Error, Model};
 
@@ -53,7 +53,10 @@ impl Model {
             left.push(("dynamics", "of G only the DC gain is undone"));
         }
         for effect in self.effects() {
-            let sections = effect.block().sections(self.rate());
+            let sections = match effect.place() {
+                Place::Parallel(own) => own.sections(self.rate()),
+                _ => Vec::new(),
+            };
             for (a, b) in &sections {
                 let own = b.iter().sum::<f64>() / (1.0 + a.iter().sum::<f64>());
                 if let [pole] = a[..] {
@@ -78,7 +81,7 @@ impl Model {
 
 /// Why a compensator that knows the past only leaves an effect alone.
 fn reason(effect: &Effect) -> &'static str {
-    match effect.block().stage() {
+    match effect.stage() {
         _ if !effect.entry().driven => "the input does not drive it",
         Stage::Dynamics => "of its dynamics only the DC gain is undone",
         _ => "it is undone where the reference is known beforehand",

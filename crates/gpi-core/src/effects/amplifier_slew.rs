@@ -1,10 +1,11 @@
-//! The amplifier's largest slope.
+//! The amplifier's slew limit.
+//!
+//! `u_s(k) = u_s(k-1) + clamp(u(k) - u_s(k-1), -s Ts, s Ts)`, (E2) in the documentation's theory, with the
+//! limit s and the sampling interval Ts: the drive follows the input, but never faster than s.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
+use super::{Block, InputStage, Proposal, Quantity, Situation, Stage, Units};
 
-/// `u_s(k) = u_s(k-1) + clamp(u(k) - u_s(k-1), -s Ts, s Ts)`: the drive cannot change faster than s.
-///
-/// (E2) in the documentation's theory.
+/// The drive cannot change faster than s: `|du_s/dt| <= s`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AmplifierSlew {
     /// The input that the amplifier drives.
@@ -20,9 +21,9 @@ impl AmplifierSlew {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    /// Limits that so many of the record's steps stay below: an amplifier that is slower than most of
-    /// them would be seen at once.
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    /// Limits at quantiles of the record's steps: an amplifier that is slower than most of the steps is seen
+    /// without a search.
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const QUANTILES: [f64; 10] = [0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 0.9995];
         let rate = situation.record.rate();
         let limits = |input| {
@@ -34,27 +35,13 @@ impl AmplifierSlew {
             limits.dedup();
             let largest = steps.last().copied().unwrap_or(0.0);
             limits.retain(|&limit| limit < largest);
-            limits
-                .into_iter()
-                .map(move |step| Candidate::finite(Self { input, limit: step * rate }))
+            limits.into_iter().map(move |step| Proposal::finite(Self { input, limit: step * rate }))
         };
         situation.inputs().flat_map(limits).collect()
     }
 }
 
 impl Block for AmplifierSlew {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         vec![self.limit]
     }
@@ -76,9 +63,15 @@ impl Block for AmplifierSlew {
             if units.input.is_empty() { String::new() } else { format!("{}/s", units.input) };
         vec![Quantity::new("slew_limit", unit, self.limit)]
     }
+}
 
-    /// The drive itself.
-    fn rest(&self, first: f64, _: Moment) -> Vec<f64> {
+impl InputStage for AmplifierSlew {
+    fn input(&self) -> usize {
+        self.input
+    }
+
+    /// The latest drive.
+    fn rest(&self, first: f64) -> Vec<f64> {
         vec![first]
     }
 
@@ -86,8 +79,8 @@ impl Block for AmplifierSlew {
         self.limit
     }
 
-    fn drive(&self, state: &mut [f64], input: f64, moment: Moment) -> f64 {
-        let reach = self.limit / moment.rate;
+    fn drive(&self, state: &mut [f64], input: f64, rate: f64) -> f64 {
+        let reach = self.limit / rate;
         state[0] += (input - state[0]).clamp(-reach, reach);
         state[0]
     }

@@ -1,11 +1,12 @@
-//! Mechanical play after G.
+//! Mechanical play (backlash) after G.
+//!
+//! `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`, (E10) in the documentation's theory: the output follows the
+//! displacement x only while the gap of width 2 b is closed. It is the play operator of half-width b.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units};
+use super::{Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units};
 use crate::operators::play;
 
-/// `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`: the output follows only when the gap is closed.
-///
-/// (E10) in the documentation's theory.
+/// The output follows only while the gap is closed: `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Backlash {
     /// The output behind the gap.
@@ -21,14 +22,14 @@ impl Backlash {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    /// Half-widths from a ten-thousandth of the span to a fifth.
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    /// Half-widths between a ten-thousandth and a fifth of the span.
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const COUNT: usize = 12;
         let blocks = |output| {
             let span = situation.span(output);
             (0..COUNT).map(move |i| {
                 let fraction = 1e-4 * 2000.0_f64.powf(i as f64 / (COUNT - 1) as f64);
-                Candidate::finite(Self { output, half_width: fraction * span })
+                Proposal::finite(Self { output, half_width: fraction * span })
             })
         };
         situation.outputs().flat_map(blocks).collect()
@@ -36,18 +37,6 @@ impl Backlash {
 }
 
 impl Block for Backlash {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         vec![self.half_width]
     }
@@ -67,9 +56,15 @@ impl Block for Backlash {
     fn quantities(&self, units: Units) -> Vec<Quantity> {
         vec![Quantity::new("gap", units.output, 2.0 * self.half_width)]
     }
+}
 
-    /// The output itself, in the middle of the gap.
-    fn rest(&self, first: f64, _: Moment) -> Vec<f64> {
+impl OutputStage for Backlash {
+    fn output(&self) -> usize {
+        self.output
+    }
+
+    /// The latest output; at first the displacement is in the middle of the gap.
+    fn rest(&self, first: f64) -> Vec<f64> {
         vec![play(self.half_width, first, 0.0)]
     }
 

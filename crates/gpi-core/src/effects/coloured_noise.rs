@@ -1,10 +1,12 @@
-//! Noise with memory.
+//! Autocorrelated noise.
+//!
+//! `e(k) = sum_i a_i e(k-i) + w(k)`, w white, (E15) in the documentation's theory: the residual e depends on
+//! its own past (an autoregressive process), and on nothing else. It is looked for last, when nothing else
+//! explains the residual.
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Finding, Quantity, Stage, Units};
 
-/// `e(k) = sum_i a_i e(k-i) + w(k)`, w white: what is left remembers itself, and nothing else.
-///
-/// (E15) in the documentation's theory.
+/// The noise is autoregressive: `e(k) = sum_i a_i e(k-i) + w(k)`, w white.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ColouredNoise {
     /// The output whose noise it is.
@@ -23,34 +25,11 @@ impl ColouredNoise {
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = false;
-
-    /// None: it is what remains when nothing else explains the residual.
-    pub(super) fn candidates(_: &Situation) -> Vec<Candidate> {
-        Vec::new()
-    }
 }
 
-impl Block for ColouredNoise {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
-    fn values(&self) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn set(&mut self, _: &[f64]) {}
-
-    fn steps(&self) -> Vec<f64> {
-        Vec::new()
+impl Finding for ColouredNoise {
+    fn output(&self) -> Option<usize> {
+        Some(self.output)
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {

@@ -1,26 +1,29 @@
 //! Another measured column that leaks in.
+//!
+//! `y += g L x`, (E13) in the documentation's theory: a measured column x (a temperature, a neighbouring
+//! axis) is added, either directly or through a first-order lag L of unit gain and time constant T, `x_L(k) =
+//! z x_L(k-1) + (1 - z) x(k)`, `z = exp(-Ts / T)`.
+//!
+//! A column that only repeats an input is not proposed.
 
-use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
+use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
 use crate::Record;
 
-/// `y += g L x`: a measured column x (a temperature, a neighbouring axis) leaks in, at once or through a
-/// first-order lag L of unit gain and time constant T. A column that only repeats an input is none.
-///
-/// (E13) in the documentation's theory.
+/// Another measured column x is added: `y += g L x`, L a first-order lag of unit gain or none.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Covariate {
-    /// The output that it adds to.
+    /// The output to which it is added.
     pub output: usize,
-    /// Whether it moves the stage, before the output stage, and not only the reading.
+    /// Whether it is a disturbance at the plant's output, before the sensor.
     #[serde(default)]
     pub moves_stage: bool,
-    /// The column's place among the record's covariates.
+    /// The column's index among the record's covariates.
     pub column: usize,
     /// Its name.
     pub label: String,
     /// g, in the output's unit per unit of the column.
     pub gain: f64,
-    /// T in seconds; 0 is at once.
+    /// T in seconds; 0 means without a lag.
     pub time_constant: f64,
     /// A change of g that moves the output by a thousandth of its span.
     pub step: f64,
@@ -34,7 +37,7 @@ impl Covariate {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let shortest = 1.0 / situation.record.rate();
         let longest = 0.3 * situation.duration();
         let lags = std::iter::once(0.0)
@@ -67,7 +70,7 @@ impl Covariate {
                         time_constant,
                         step,
                     };
-                    found.push(Candidate::linear(block, [0]));
+                    found.push(Proposal::linear(block, [0]));
                 }
             }
         }
@@ -75,9 +78,9 @@ impl Covariate {
     }
 }
 
-/// Whether a column says no more than an input does: a reference that the input was made from, a monitor of it.
+/// Whether a column only repeats an input: a reference from which the input was made, or a monitor of it.
 fn follows_an_input(record: &Record, column: usize) -> bool {
-    /// Of the column's squares about its mean, what no multiple of the input explains.
+    /// Largest part of the column's variance that the input leaves unexplained.
     const LEFT: f64 = 1e-3;
     (0..record.inputs().len()).any(|input| {
         let (mut samples, mut sums) = (0.0, [0.0; 5]);
@@ -94,22 +97,6 @@ fn follows_an_input(record: &Record, column: usize) -> bool {
 }
 
 impl Block for Covariate {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        if self.moves_stage { Stage::Displaced } else { Self::STAGE }
-    }
-
-    fn elsewhere(&self) -> Option<Effect> {
-        Some(Self { moves_stage: !self.moves_stage, ..self.clone() }.into())
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         if self.time_constant > 0.0 { vec![self.gain, self.time_constant] } else { vec![self.gain] }
     }
@@ -139,9 +126,23 @@ impl Block for Covariate {
         }
         quantities
     }
+}
 
-    /// The lagged column.
-    fn rest(&self, _: f64, moment: Moment) -> Vec<f64> {
+impl Added for Covariate {
+    fn output(&self) -> usize {
+        self.output
+    }
+
+    fn moves_stage(&self) -> bool {
+        self.moves_stage
+    }
+
+    fn set_moves_stage(&mut self, moves_stage: bool) {
+        self.moves_stage = moves_stage;
+    }
+
+    /// The column behind the lag.
+    fn rest(&self, moment: Moment) -> Vec<f64> {
         vec![moment.covariates.get(self.column).copied().unwrap_or(0.0)]
     }
 

@@ -1,36 +1,41 @@
 //! Slow relaxation driven by v.
+//!
+//! `y += sum_i c_i L_i v`, (E6) in the documentation's theory: first-order lags L_i of unit gain and time
+//! constants T_i in parallel with G. After a step of v the output goes on by c_i within a few T_i. At the
+//! sampling interval Ts,
+//!
+//! ```text
+//! L_i = (1 - z_i) q^-1 / (1 - z_i q^-1),      z_i = exp(-Ts / T_i).
+//! ```
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Block, Coefficients, ParallelSections, Proposal, Quantity, Situation, Stage, Units};
 
-/// `y += sum_i c_i L_i v` with first-order lags L_i of unit gain and time constants T_i: after a step the
-/// output goes on by c_i within a few T_i.
-///
-/// (E6) in the documentation's theory.
+/// The output relaxes after the fast motion: `y += sum_i c_i L_i v` with first-order lags L_i of unit gain.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Creep {
     /// The input whose v drives it.
     pub input: usize,
     /// T_i in seconds.
     pub time_constants: Vec<f64>,
-    /// c_i, fractions of the displacement that v leads to at once.
+    /// c_i, relative to the displacement that follows v without the lags (the DC gain of G is 1).
     pub gains: Vec<f64>,
-    /// Samples by which v arrives late: the dead time of G.
+    /// The delay of v in samples: the dead time of G.
     pub dead_time: usize,
 }
 
-/// Shorter lags, in seconds, are dynamics; so are those that die out within a few samples.
+/// The shortest time constant of creep in seconds: faster lags belong to the dynamics.
 fn shortest(rate: f64) -> f64 {
     const SECONDS: f64 = 0.03;
     const SAMPLES: f64 = 5.0;
     SECONDS.max(SAMPLES / rate)
 }
 
-/// Time constant in samples up to which a lag may be dynamics: a slower one is creep.
+/// The longest time constant of the dynamics in samples: slower lags are creep.
 pub(crate) fn longest_lag(rate: f64) -> f64 {
     shortest(rate) * rate
 }
 
-/// Longer ones are a drift in proportion to the integral of v.
+/// A longer time constant in seconds is a drift proportional to the integral of v.
 const LONGEST: f64 = 3e3;
 
 impl Creep {
@@ -40,8 +45,8 @@ impl Creep {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
 
-    /// One, two and three lags between somewhat more than the shortest and the record's length.
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    /// One, two and three lags between the shortest time constant and the record's length.
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const MORE: f64 = 5.0 / 3.0;
         let (low, high) = (MORE * shortest(situation.record.rate()), situation.duration());
         if situation.outputs().len() > 1 || high < 4.0 * low {
@@ -55,25 +60,13 @@ impl Creep {
             let gains = vec![0.0; time_constants.len()];
             let block = Self { input, gains, time_constants: time_constants.clone(), dead_time: 0 };
             let lags = time_constants.len();
-            Candidate::linear(block, lags..2 * lags)
+            Proposal::linear(block, lags..2 * lags)
         };
         situation.inputs().flat_map(|input| sets.iter().map(move |set| block(input, set))).collect()
     }
 }
 
 impl Block for Creep {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         [&self.time_constants[..], &self.gains[..]].concat()
     }
@@ -89,7 +82,7 @@ impl Block for Creep {
         times.chain(self.gains.iter().map(|_| 1e-3)).collect()
     }
 
-    /// Creep goes on in one direction, and what is slower than the record is a trend.
+    /// All lags relax in one direction, and none is slower than the record, which would be a trend.
     fn is_plausible(&self, duration: f64) -> bool {
         self.gains.windows(2).all(|pair| pair[0] * pair[1] >= 0.0)
             && self.time_constants.iter().all(|&time| time < duration)
@@ -103,8 +96,14 @@ impl Block for Creep {
         }
         quantities
     }
+}
 
-    fn sections(&self, rate: f64) -> Vec<(Vec<f64>, Vec<f64>)> {
+impl ParallelSections for Creep {
+    fn input(&self) -> usize {
+        self.input
+    }
+
+    fn sections(&self, rate: f64) -> Vec<Coefficients> {
         let lag = |(time, gain): (&f64, &f64)| {
             let pole = (-1.0 / (time * rate)).exp();
             (vec![-pole], vec![gain * (1.0 - pole)])
@@ -112,7 +111,7 @@ impl Block for Creep {
         self.time_constants.iter().zip(&self.gains).map(lag).collect()
     }
 
-    fn set_sections(&mut self, sections: &[(Vec<f64>, Vec<f64>)], dead_time: usize, rate: f64) {
+    fn set_sections(&mut self, sections: &[Coefficients], dead_time: usize, rate: f64) {
         self.dead_time = dead_time;
         for (i, (a, b)) in sections.iter().enumerate() {
             let pole = -a[0];

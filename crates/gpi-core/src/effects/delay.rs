@@ -1,19 +1,20 @@
-//! Dead time beyond the linear model's.
+//! A delay of the input beyond the dead time of the linear model.
+//!
+//! `u_d(t) = u(t - T)`, (E1) in the documentation's theory. u is linearly interpolated between samples: with
+//! `T = (n + f)` samples, n whole and `0 <= f < 1`, `u_d(k) = (1 - f) u(k - n) + f u(k - n - 1)`.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
+use super::{Block, InputStage, Proposal, Quantity, Situation, Stage, Units};
 
-/// `u_d(t) = u(t - T)`: the drive arrives T later; between samples u is a straight line.
-///
-/// (E1) in the documentation's theory.
+/// The drive is the input of T seconds before: `u_d(t) = u(t - T)`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Delay {
-    /// The input that arrives late.
+    /// The input that is delayed.
     pub input: usize,
     /// T times the sampling rate.
     pub samples: f64,
 }
 
-/// A longer dead time is better cut out of the record.
+/// The longest delay in samples. A longer one should be removed from the record.
 const LONGEST: f64 = 100.0;
 
 impl Delay {
@@ -23,26 +24,14 @@ impl Delay {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let delays =
-            |input| [1.0, 2.0, 4.0, 8.0].map(|samples| Candidate::finite(Self { input, samples }));
+            |input| [1.0, 2.0, 4.0, 8.0].map(|samples| Proposal::finite(Self { input, samples }));
         situation.inputs().flat_map(delays).collect()
     }
 }
 
 impl Block for Delay {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         vec![self.samples]
     }
@@ -62,9 +51,15 @@ impl Block for Delay {
     fn quantities(&self, _: Units) -> Vec<Quantity> {
         vec![Quantity::new("delay", "samples", self.samples)]
     }
+}
+
+impl InputStage for Delay {
+    fn input(&self) -> usize {
+        self.input
+    }
 
     /// The latest inputs, the newest first.
-    fn rest(&self, first: f64, _: Moment) -> Vec<f64> {
+    fn rest(&self, first: f64) -> Vec<f64> {
         vec![first; LONGEST as usize + 2]
     }
 
@@ -72,7 +67,7 @@ impl Block for Delay {
         self.samples
     }
 
-    fn drive(&self, state: &mut [f64], input: f64, _: Moment) -> f64 {
+    fn drive(&self, state: &mut [f64], input: f64, _: f64) -> f64 {
         let needed = self.samples as usize + 2;
         let state = &mut state[..needed];
         state.rotate_right(1);

@@ -1,23 +1,23 @@
 //! Slow change that the input does not drive.
+//!
+//! `y += d(t)`, (E11) in the documentation's theory; d is a smooth curve through evenly spaced knots (see
+//! `knots`). Its first value is 0, because the model has an offset.
 
-use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units, knots};
+use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units, knots};
 
-/// `y += d(t)`, d a slow function of time: a smooth curve through evenly spaced knots, the first of which
-/// is 0 (the offset at the start is the model's).
-///
-/// (E11) in the documentation's theory.
+/// The output drifts: `y += d(t)` with a smooth curve d through knots.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Drift {
     /// The output that drifts.
     pub output: usize,
-    /// Whether it moves the stage, before the output stage, and not only the reading.
+    /// Whether it is a disturbance at the plant's output, before the sensor.
     #[serde(default)]
     pub moves_stage: bool,
     /// d at the second knot, the third, .., in the output's unit.
     pub changes: Vec<f64>,
     /// Seconds from the first knot to the last.
     pub duration: f64,
-    /// The span of the output, which steps are counted from.
+    /// The span of the output, which scales the steps.
     pub span: f64,
 }
 
@@ -28,37 +28,18 @@ impl Drift {
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let duration = situation.duration();
-        let block = |output, knots: usize| {
-            let (changes, span) = (vec![0.0; knots - 1], situation.span(output));
-            Candidate::linear(
-                Self { output, moves_stage: false, changes, duration, span },
-                0..knots - 1,
-            )
+        let block = |output, later: usize| {
+            let (changes, span) = (vec![0.0; later], situation.span(output));
+            Proposal::linear_in_all(Self { output, moves_stage: false, changes, duration, span })
         };
-        let blocks = |output| [2, 3, 5, 9, 17, 33].map(|knots| block(output, knots));
+        let blocks = |output| knots::COUNTS.map(|later| block(output, later));
         situation.outputs().flat_map(blocks).collect()
     }
 }
 
 impl Block for Drift {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        if self.moves_stage { Stage::Displaced } else { Self::STAGE }
-    }
-
-    fn elsewhere(&self) -> Option<Effect> {
-        Some(Self { moves_stage: !self.moves_stage, ..self.clone() }.into())
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         self.changes.clone()
     }
@@ -72,11 +53,21 @@ impl Block for Drift {
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
-        let time = |i: usize| self.duration * (i + 1) as f64 / self.changes.len() as f64;
-        let change = |(i, &value): (usize, &f64)| {
-            Quantity::new(format!("drift[{:.4} s]", time(i)), units.output, value)
-        };
-        self.changes.iter().enumerate().map(change).collect()
+        knots::quantities("drift", units.output, &self.changes, self.duration)
+    }
+}
+
+impl Added for Drift {
+    fn output(&self) -> usize {
+        self.output
+    }
+
+    fn moves_stage(&self) -> bool {
+        self.moves_stage
+    }
+
+    fn set_moves_stage(&mut self, moves_stage: bool) {
+        self.moves_stage = moves_stage;
     }
 
     fn add(&self, _: &mut [f64], moment: Moment) -> f64 {

@@ -1,11 +1,13 @@
-//! Sensitivity that changes slowly.
+//! Sensitivity that changes slowly with time.
+//!
+//! `y = x (1 + g(t))`, (E9) in the documentation's theory; g is a smooth curve through evenly spaced knots
+//! (see `knots`). Its first value is 0, because the play weights hold the gain at the start.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units, knots};
+use super::{
+    Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units, knots,
+};
 
-/// `y = x (1 + g(t))`, g a slow function of time: a smooth curve through evenly spaced knots, the first
-/// of which is 0 (the gain at the start is the model's).
-///
-/// (E9) in the documentation's theory.
+/// The sensitivity changes slowly: `y = x (1 + g(t))` with a smooth curve g through knots.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GainDrift {
     /// The output whose sensitivity changes.
@@ -23,34 +25,16 @@ impl GainDrift {
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let duration = situation.duration();
-        let block = |output, knots: usize| {
-            let block = Self { output, changes: vec![0.0; knots - 1], duration };
-            Candidate::linear(block, 0..knots - 1)
-        };
-        let blocks = |output| [2, 3, 5, 9, 17, 33].map(|knots| block(output, knots));
+        let block = |output, later| Self { output, changes: vec![0.0; later], duration };
+        let blocks =
+            |output| knots::COUNTS.map(|later| Proposal::linear_in_all(block(output, later)));
         situation.outputs().flat_map(blocks).collect()
-    }
-
-    fn gain(&self, time: f64) -> f64 {
-        1.0 + knots::at(&self.changes, self.duration, time)
     }
 }
 
 impl Block for GainDrift {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         self.changes.clone()
     }
@@ -64,15 +48,17 @@ impl Block for GainDrift {
     }
 
     fn quantities(&self, _: Units) -> Vec<Quantity> {
-        let time = |i: usize| self.duration * (i + 1) as f64 / self.changes.len() as f64;
-        let change = |(i, &value): (usize, &f64)| {
-            Quantity::new(format!("gain_change[{:.4} s]", time(i)), "", value)
-        };
-        self.changes.iter().enumerate().map(change).collect()
+        knots::quantities("gain_change", "", &self.changes, self.duration)
+    }
+}
+
+impl OutputStage for GainDrift {
+    fn output(&self) -> usize {
+        self.output
     }
 
     fn sense(&self, _: &mut [f64], output: f64, moment: Moment) -> (f64, Slope) {
-        let gain = self.gain(moment.time);
+        let gain = 1.0 + knots::at(&self.changes, self.duration, moment.time);
         (gain * output, Slope::Times(gain))
     }
 }

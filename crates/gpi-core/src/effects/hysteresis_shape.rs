@@ -1,16 +1,24 @@
 //! Minor loops that are not congruent.
+//!
+//! The plays are read through curves, (E4) in the documentation's theory:
+//!
+//! ```text
+//! v = sum_i p_i (F_i + s q(f_i, r_i)),      f_i = (F_i - m) / s,
+//! dq/df = sum_a sum_b c_ab P_a(f) P_b(2 r / R - 1),      a = 1 .. A,  b = 0 .. B - 1,
+//! ```
+//!
+//! with the Legendre polynomials P. `P_a` of a >= 1 integrates to zero over [-1, 1], so that q = 0 at both
+//! ends of the plays' range and beyond. Half-widths above R count as R. The play of half-width 0 is read as
+//! it is, because its curve is that of the envelope.
+//!
+//! Sums of curves of plays are the Preisach operators: `1 + dq/df` is the density over the half-plane of
+//! thresholds. Their minor loops change with the place; with q = 0 the hysteresis is the declared one. The
+//! integral of `P_a` from -1 is `(P_{a+1} - P_{a-1}) / (2 a + 1)`.
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Block, PlayCurves, Proposal, Quantity, Situation, Stage, Units};
 
-/// Plays read through curves: `v = sum_i p_i (F_i + s q(f_i, r_i))` with `f_i = (F_i - m) / s` and
-/// `dq/df = sum_a sum_b c_ab P_a(f) P_b(2 r / R - 1)`, a = 1 .. A, b = 0 .. B - 1, P Legendre's
-/// polynomials, q = 0 at both ends of the plays' range and beyond; r beyond R counts as R. The play of
-/// half-width 0 is read as it is: its curve is the envelope's.
-///
-/// Sums of curves of plays are the Preisach operators (1 + dq/df is their density over the half-plane of
-/// thresholds), whose minor loops change with their place. The declared hysteresis is q = 0.
-///
-/// (E4) in the documentation's theory.
+/// Plays F are read through curves: `v = sum_i p_i (F_i + s q((F_i - m) / s, r_i))`, where dq/df is a sum of
+/// products of Legendre polynomials. Its minor loops are not congruent, as those of Preisach operators.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HysteresisShape {
     /// The input whose hysteresis it is.
@@ -38,10 +46,10 @@ impl HysteresisShape {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         /// A and B.
         const SIZES: [(usize, usize); 2] = [(2, 3), (7, 5)];
-        let mut candidates = Vec::new();
+        let mut proposals = Vec::new();
         for input in situation.inputs() {
             let ((low, high), widest) = (situation.places[input], situation.widest[input]);
             let (middle, scale) = (0.5 * (low + high), 0.5 * (high - low));
@@ -51,13 +59,13 @@ impl HysteresisShape {
             for (degrees, widths) in SIZES {
                 let coefficients = vec![0.0; degrees * widths];
                 let block = Self { input, coefficients, widths, middle, scale, widest };
-                candidates.push(Candidate::linear(block, 0..degrees * widths));
+                proposals.push(Proposal::linear_in_all(block));
             }
         }
-        candidates
+        proposals
     }
 
-    /// Legendre's polynomials P_0, P_1, ..
+    /// The Legendre polynomials P_0, P_1, ..
     fn legendre(x: f64) -> [f64; MOST + 2] {
         let mut values = [1.0; MOST + 2];
         values[1] = x;
@@ -72,7 +80,7 @@ impl HysteresisShape {
         Self::legendre((2.0 * half_width / self.widest - 1.0).clamp(-1.0, 1.0))
     }
 
-    /// P_a integrated from -1, and P_a itself, at a place.
+    /// The integral of P_a from -1, and P_a itself, at the value `place` of a play.
     fn by_place(&self, place: f64) -> impl Iterator<Item = (f64, f64)> {
         let f = (place - self.middle) / self.scale;
         let values = Self::legendre(f.clamp(-1.0, 1.0));
@@ -85,18 +93,6 @@ impl HysteresisShape {
 }
 
 impl Block for HysteresisShape {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         self.coefficients.clone()
     }
@@ -105,7 +101,7 @@ impl Block for HysteresisShape {
         self.coefficients.copy_from_slice(values);
     }
 
-    /// A density that differs more from the plays' own than tenfold is no shape but a misfit.
+    /// A density of more than ten times the plays' own is a failed fit.
     fn bounds(&self) -> Vec<(f64, f64)> {
         vec![(-10.0, 10.0); self.coefficients.len()]
     }
@@ -128,6 +124,12 @@ impl Block for HysteresisShape {
             format!("{count} coefficients in rows of {widths}; at most {MOST} rows of {MOST}")
         })
     }
+}
+
+impl PlayCurves for HysteresisShape {
+    fn input(&self) -> usize {
+        self.input
+    }
 
     fn read(&self, half_width: f64, place: f64) -> (f64, f64) {
         if half_width == 0.0 {
@@ -143,10 +145,6 @@ impl Block for HysteresisShape {
             density += weight * own;
         }
         (place + self.scale * curve, 1.0 + density)
-    }
-
-    fn reads(&self) -> bool {
-        true
     }
 
     fn read_slopes(&self, half_width: f64, place: f64, weight: f64, slopes: &mut [f64]) {

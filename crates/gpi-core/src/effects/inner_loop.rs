@@ -5,19 +5,19 @@ use crate::operators::play;
 
 /// `w = law(z)`, and `w(k)` drives the states of G for sample k + 1: `x+ = A x + B v + E w`.
 ///
-/// No loop is algebraic, because w acts a sample later. With [`Law::Stops`] w is bounded, so that a stable
-/// G stays bounded whatever the loop's gain.
+/// No loop is algebraic, because w acts one sample later. With [`Law::Stops`] w is bounded, so that a stable
+/// G stays bounded for any gain of the loop.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct InnerLoop {
-    /// What z is.
+    /// The signal z.
     pub sees: Sees,
-    /// From z to w.
+    /// The law from z to w.
     pub law: Law,
     /// A column of E, by the states of G; those of its dead time, which come first, are not driven.
     pub drives: Vec<f64>,
 }
 
-/// The signal that goes around a loop.
+/// The input z of a loop's law.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sees {
@@ -32,7 +32,7 @@ pub enum Sees {
     },
 }
 
-/// What a loop makes of its signal.
+/// The static or hysteretic law of a loop.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
@@ -43,7 +43,7 @@ pub enum Law {
         /// In the unit of z.
         scale: f64,
     },
-    /// `w = sum_i g_i (z - F_{r_i}(z))`: stops, the elastic part of what plays F leave (Prandtl's model).
+    /// `w = sum_i g_i (z - F_{r_i}(z))`: a sum of stops with the plays F (Prandtl's model of elastoplasticity).
     Stops {
         /// r_i, in the unit of z.
         half_widths: Vec<f64>,
@@ -53,7 +53,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// How many plays it remembers.
+    /// The number of its stops, whose plays are its state.
     pub(crate) fn stops(&self) -> usize {
         match self {
             Self::Power { .. } => 0,
@@ -61,8 +61,8 @@ impl Law {
         }
     }
 
-    /// w. `places` are those of the plays, and `marks` tell how changes of z pass: the slope of a power,
-    /// or for each stop where its play slides to, 0 where it sticks.
+    /// w. `places` are the outputs of the plays. `marks` receive how changes of z pass: the slope of a power,
+    /// or for each stop the direction in which its play slides, 0 where it sticks.
     pub(crate) fn step(&self, places: &mut [f64], z: f64, marks: &mut [f64]) -> f64 {
         match self {
             Self::Power { exponent, scale } => {
@@ -83,20 +83,20 @@ impl Law {
         }
     }
 
-    /// How many marks [`Law::step`] leaves.
+    /// The number of marks of [`Law::step`].
     pub(crate) fn marks(&self) -> usize {
         self.stops().max(1)
     }
 }
 
 impl Sees {
-    /// z at a state of G and its dead time, v and the displacement of all outputs.
+    /// z for a state of G with its dead time, v, and the displacement of all outputs.
     pub(crate) fn signal(&self, state: &[f64], v: &[f64], displacement: &[f64]) -> f64 {
         match self {
             Self::Output(output) => displacement[*output],
             Self::Mixture { states, inputs } => {
                 let (late, own) = state.split_at(state.len() - states.len());
-                // what comes out of the dead time is what went in first
+                // the oldest inputs leave the dead time
                 let v = if late.is_empty() { v } else { &late[late.len() - inputs.len()..] };
                 dot(states, own) + dot(inputs, v)
             }
@@ -105,7 +105,7 @@ impl Sees {
 }
 
 impl InnerLoop {
-    /// Why it does not fit around a G of so many states, inputs and outputs, or is none.
+    /// Why it is invalid around a G of so many states, inputs and outputs; `None` where it is valid.
     pub(crate) fn flaw(&self, states: usize, inputs: usize, outputs: usize) -> Option<String> {
         let drives = self.drives.len();
         if drives > states {

@@ -1,11 +1,23 @@
 //! A slow function of time: a smooth curve through evenly spaced knots.
 
+use super::quantity::Quantity;
+
+/// Numbers of knots after the first that are proposed.
+pub(super) const COUNTS: [usize; 6] = [1, 2, 4, 8, 16, 32];
+
+/// The value at every later knot, named by its time.
+pub(super) fn quantities(name: &str, unit: &str, later: &[f64], duration: f64) -> Vec<Quantity> {
+    let time = |i: usize| duration * (i + 1) as f64 / later.len() as f64;
+    let name = |i: usize| format!("{name}[{:.4} s]", time(i));
+    later.iter().enumerate().map(|(i, &value)| Quantity::new(name(i), unit, value)).collect()
+}
+
 /// The value at `time` of a function that is 0 at time 0 and has these values at evenly spaced later knots,
 /// the last of them at `duration`; constant beyond.
 ///
-/// Between knots runs Catmull and Rom's cubic, whose slope at a knot is that from its neighbour to its
-/// neighbour: linear in the values, and as smooth as what heats up or wears. Beyond the ends a parabola
-/// goes on, or the line where there are two knots alone.
+/// Between the knots it is the cubic of Catmull and Rom (1974). Its slope at a knot is that of the line through
+/// both neighbours, so that it is linear in the values and continuously differentiable. Neighbours beyond the
+/// ends are extrapolated by a parabola, or by a line where there are only two knots.
 pub(super) fn at(later: &[f64], duration: f64, time: f64) -> f64 {
     let last = later.len();
     if last == 0 || duration <= 0.0 {

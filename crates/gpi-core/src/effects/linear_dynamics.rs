@@ -1,11 +1,15 @@
 //! A mode that the linear part lacks.
+//!
+//! `(b1 q^-1 + b2 q^-2) / (1 + a1 q^-1 + a2 q^-2)` from v to y in parallel with G, (E5) in the
+//! documentation's theory, behind the dead time of G: one more mode, or two real poles.
+//!
+//! The poles `z = -a1/2 +- sqrt(a1^2/4 - a2)` are those of `s = rate ln z` in continuous time. A pair gives
+//! the natural frequency `|s| / 2 pi` and the damping `-Re s / |s|`, real poles give time constants `-1/s`;
+//! the static gain is `(b1 + b2) / (1 + a1 + a2)`.
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Block, Coefficients, ParallelSections, Proposal, Quantity, Situation, Stage, Units};
 
-/// `(b1 q^-1 + b2 q^-2) / (1 + a1 q^-1 + a2 q^-2)` from v to y, beside G: one more mode, or two real
-/// poles.
-///
-/// (E5) in the documentation's theory.
+/// One more mode or two real poles in parallel with G: `(b1 q^-1 + b2 q^-2) / (1 + a1 q^-1 + a2 q^-2)`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LinearDynamics {
     /// The input whose v drives it.
@@ -16,7 +20,7 @@ pub struct LinearDynamics {
     pub numerator: Vec<f64>,
     /// The sampling rate in Hz.
     pub rate: f64,
-    /// Samples by which v arrives late: the dead time of G.
+    /// The delay of v in samples: the dead time of G.
     pub dead_time: usize,
 }
 
@@ -27,8 +31,8 @@ impl LinearDynamics {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
 
-    /// Lightly damped modes from a few periods a record to close to half the rate.
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    /// Lightly damped modes between ten periods a record and close to half the sampling rate.
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const MODES: usize = 24;
         const DAMPING: f64 = 0.03;
         let rate = situation.record.rate();
@@ -44,23 +48,11 @@ impl LinearDynamics {
             Self { input, denominator, numerator: vec![0.0; 2], rate, dead_time: 0 }
         };
         let modes = |input| (0..MODES).map(move |place| mode(input, place));
-        situation.inputs().flat_map(modes).map(|mode| Candidate::linear(mode, 2..4)).collect()
+        situation.inputs().flat_map(modes).map(|mode| Proposal::linear(mode, 2..4)).collect()
     }
 }
 
 impl Block for LinearDynamics {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         [&self.denominator[..], &self.numerator[..]].concat()
     }
@@ -71,7 +63,7 @@ impl Block for LinearDynamics {
     }
 
     fn steps(&self) -> Vec<f64> {
-        // of the numerator, as much as gives a gain of a ten-thousandth
+        // a step of the numerator changes the static gain by a ten-thousandth
         let gain = 1.0 + self.denominator.iter().sum::<f64>();
         vec![1e-6, 1e-6, 1e-4 * gain, 1e-4 * gain]
     }
@@ -90,20 +82,26 @@ impl Block for LinearDynamics {
         }
         // s = rate ln z
         let (radius, angle) = (a2.sqrt(), (-0.5 * a1 / a2.sqrt()).acos());
-        let (decay, swing) = (-radius.ln(), angle);
-        let natural = decay.hypot(swing);
+        let decay = -radius.ln();
+        let natural = decay.hypot(angle);
         vec![
             Quantity::new("frequency", "Hz", self.rate * natural / std::f64::consts::TAU),
             Quantity::new("damping", "", decay / natural),
             gain,
         ]
     }
+}
 
-    fn sections(&self, _: f64) -> Vec<(Vec<f64>, Vec<f64>)> {
+impl ParallelSections for LinearDynamics {
+    fn input(&self) -> usize {
+        self.input
+    }
+
+    fn sections(&self, _: f64) -> Vec<Coefficients> {
         vec![(self.denominator.clone(), self.numerator.clone())]
     }
 
-    fn set_sections(&mut self, sections: &[(Vec<f64>, Vec<f64>)], dead_time: usize, _: f64) {
+    fn set_sections(&mut self, sections: &[Coefficients], dead_time: usize, _: f64) {
         self.dead_time = dead_time;
         (self.denominator, self.numerator) = sections[0].clone();
     }

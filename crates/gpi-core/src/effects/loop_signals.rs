@@ -1,4 +1,4 @@
-//! What loops around G with several inputs and outputs may go through.
+//! Signals of loops around a G with several inputs and outputs.
 
 use super::{Sees, Situation};
 use crate::Matrix;
@@ -20,29 +20,29 @@ impl LoopSignal {
         Sees::Mixture { states: row(&self.states), inputs: row(&self.inputs) }
     }
 
-    /// Root mean square, without the mean.
+    /// Standard deviation.
     pub(super) fn rms(&self) -> f64 {
         self.values.column(0).variance().sqrt()
     }
 }
 
-/// What loops make of their signals.
+/// The kind of law of the loops.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Shape {
     /// Hysteresis.
     Stops,
-    /// A force that differs between the directions.
+    /// A force that differs between the two directions.
     Square,
 }
 
-/// The families of loops that are left to be tried: the next signals for hysteresis, and squares.
+/// The families of loops that were not tried yet: the next signals for hysteresis, and squares.
 pub(super) fn families(situation: &Situation) -> Vec<(Shape, Vec<LoopSignal>)> {
     let displaced = displaced(situation);
     let (apart, together) = (pairs(&displaced, -1.0), pairs(&displaced, 1.0));
     let count = |has_stops: bool| {
         situation.loops.iter().filter(|inner| (inner.law.stops() > 0) == has_stops).count()
     };
-    // one after the other, as long as each has something to explain
+    // a family follows when all loops of the one before are in the model
     let mut known = 0;
     let next =
         [displaced.clone(), driven(situation), apart, together].into_iter().find(|signals| {
@@ -53,9 +53,9 @@ pub(super) fn families(situation: &Situation) -> Vec<(Shape, Vec<LoopSignal>)> {
     next.map(|signals| (Shape::Stops, signals)).into_iter().chain(squares).collect()
 }
 
-/// The v that would hold each displacement still: `G(1)^-1 (C x + D v)`.
+/// The v that gives each displacement in steady state: `G(1)^-1 (C x + D v)`.
 fn displaced(situation: &Situation) -> Vec<LoopSignal> {
-    /// Combinations of outputs with less gain than this part of the largest are not seen.
+    /// Combinations of outputs with a smaller gain, relative to the largest, are left out.
     const RANK: f64 = 1e-6;
     let dynamics = situation.dynamics;
     let dc = dynamics.dc_gain();
@@ -65,17 +65,17 @@ fn displaced(situation: &Situation) -> Vec<LoopSignal> {
     signals(&states, &inputs, &values)
 }
 
-/// Each v: what the input does to the mechanics by itself.
+/// Each v, the drive of the mechanics.
 fn driven(situation: &Situation) -> Vec<LoopSignal> {
     let count = situation.inputs().len();
     let states = Matrix::zeros(count, situation.dynamics.order());
     signals(&states, &Matrix::identity(count, count), &stacked(situation.intermediates))
 }
 
-/// Sums or differences of neighbours, around.
+/// Sums or differences of neighbours; the last one's neighbour is the first.
 fn pairs(signals: &[LoopSignal], sign: f64) -> Vec<LoopSignal> {
     let count = signals.len();
-    // of two, each is the other's neighbour on both sides
+    // two signals have one pair
     let pairs = if count > 2 { count } else { count / 2 };
     let pair = |i: usize| {
         let (one, other) = (&signals[i], &signals[(i + 1) % count]);
@@ -97,7 +97,7 @@ fn signals(states: &Matrix, inputs: &Matrix, values: &Matrix) -> Vec<LoopSignal>
     (0..values.ncols()).map(signal).collect()
 }
 
-/// All experiments below each other.
+/// All experiments, one below the other.
 fn stacked(signals: &[Matrix]) -> Matrix {
     let rows = signals.iter().map(Matrix::nrows).sum();
     let mut stacked = Matrix::zeros(rows, signals.first().map_or(0, Matrix::ncols));
@@ -147,7 +147,7 @@ mod tests {
         let found = next(&plain);
         assert_eq!(found.iter().map(|family| family.0).collect::<Vec<_>>(), [true, false]);
         assert_eq!(found[0].1, found[1].1, "both of the displacements");
-        // beside two loops of stops and one of a power: the second v itself
+        // with two loops of stops and one of a power, the next signals are v
         assert_eq!(next(&model), [(true, vec![0.0, 1.0])]);
     }
 }

@@ -1,8 +1,9 @@
 //! The catalogue of effects: what a declared model (envelope, plays, G, white noise) may lack.
 //!
-//! Every effect is a block in its own place of the chain, steps sample by sample, is saved in model files
-//! and has its parameters refined together with the rest of the model. To add one, write its file and name
-//! it in the catalogue below.
+//! Every effect acts in its own place of the chain, is simulated sample by sample, is saved in model files
+//! and has its parameters estimated together with the rest of the model. To add one, write its file (the
+//! constants that describe it, `proposals`, [`Block`] and the trait of its [`Place`]) and name it with its
+//! place in the catalogue below.
 
 mod amplifier_slew;
 mod backlash;
@@ -21,13 +22,16 @@ mod loop_signals;
 mod outliers;
 mod output_nonlinearity;
 mod periodic_disturbance;
+mod place;
+mod proposal;
+mod quantity;
 mod rate_dependence;
 mod situation;
 mod stiffness;
 
 pub use amplifier_slew::AmplifierSlew;
 pub use backlash::Backlash;
-pub use block::{Block, Moment, Quantity, Slope, Stage, Units};
+pub use block::Block;
 pub use coloured_noise::ColouredNoise;
 pub use covariate::Covariate;
 pub use creep::Creep;
@@ -40,15 +44,21 @@ pub use linear_dynamics::LinearDynamics;
 pub use outliers::Outliers;
 pub use output_nonlinearity::OutputNonlinearity;
 pub use periodic_disturbance::PeriodicDisturbance;
+pub use place::{
+    Added, ClosedLoops, Coefficients, Finding, InputStage, Moment, OutputStage, ParallelSections,
+    Place, PlaceMut, PlayCurves, PlayWidths, Slope, Stage,
+};
+pub use quantity::{Quantity, Units};
 pub use rate_dependence::{RateDependence, SpeedLaw};
 pub use stiffness::Stiffness;
 
 pub(crate) use creep::longest_lag;
-pub(crate) use situation::{Candidate, Situation};
+pub(crate) use proposal::Proposal;
+pub(crate) use situation::Situation;
 
 /// Declares [`Effect`], one variant an effect, and [`CATALOGUE`].
 macro_rules! catalogue {
-    ($($effect:ident),* $(,)?) => {
+    ($($effect:ident: $place:ident),* $(,)?) => {
         /// An effect of the catalogue with its parameters.
         #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(tag = "name", rename_all = "kebab-case")]
@@ -57,13 +67,19 @@ macro_rules! catalogue {
         }
 
         impl Effect {
-            /// The block itself.
-            pub fn block(&self) -> &dyn Block {
-                match self { $(Self::$effect(block) => block),* }
+            /// The place in which it acts, and how.
+            pub fn place(&self) -> Place<'_> {
+                match self { $(Self::$effect(own) => Place::$place(own)),* }
             }
 
-            pub(crate) fn block_mut(&mut self) -> &mut dyn Block {
-                match self { $(Self::$effect(block) => block),* }
+            /// The same, to be changed.
+            pub fn place_mut(&mut self) -> PlaceMut<'_> {
+                match self { $(Self::$effect(own) => PlaceMut::$place(own)),* }
+            }
+
+            /// Its entry in the catalogue.
+            pub fn entry(&self) -> &'static Entry {
+                match self { $(Self::$effect(_) => &$effect::ENTRY),* }
             }
         }
 
@@ -73,34 +89,48 @@ macro_rules! catalogue {
             }
         })*
 
+        $(impl $effect {
+            const ENTRY: Entry = Entry {
+                name: $effect::NAME,
+                what: $effect::WHAT,
+                stage: $effect::STAGE,
+                driven: $effect::DRIVEN,
+                repeats: $effect::REPEATS,
+                proposals: proposals!($effect: $place),
+            };
+        })*
+
         /// All effects, in the order of the chain.
-        pub const CATALOGUE: &[Entry] = &[$(Entry {
-            name: $effect::NAME,
-            what: $effect::WHAT,
-            stage: $effect::STAGE,
-            driven: $effect::DRIVEN,
-            repeats: $effect::REPEATS,
-            candidates: $effect::candidates,
-        }),*];
+        pub const CATALOGUE: &[Entry] = &[$($effect::ENTRY),*];
+    };
+}
+
+/// The function that proposes an effect's blocks. Findings propose none.
+macro_rules! proposals {
+    ($effect:ident: Finding) => {
+        |_| Vec::new()
+    };
+    ($effect:ident: $place:ident) => {
+        |situation| Proposal::all($effect::proposals(situation))
     };
 }
 
 catalogue! {
-    Delay,
-    AmplifierSlew,
-    RateDependence,
-    HysteresisShape,
-    LinearDynamics,
-    Creep,
-    Stiffness,
-    OutputNonlinearity,
-    GainDrift,
-    Backlash,
-    Drift,
-    PeriodicDisturbance,
-    Covariate,
-    Outliers,
-    ColouredNoise,
+    Delay: Input,
+    AmplifierSlew: Input,
+    RateDependence: Widths,
+    HysteresisShape: Curves,
+    LinearDynamics: Parallel,
+    Creep: Parallel,
+    Stiffness: Loops,
+    OutputNonlinearity: Output,
+    GainDrift: Output,
+    Backlash: Output,
+    Drift: Added,
+    PeriodicDisturbance: Added,
+    Covariate: Added,
+    Outliers: Finding,
+    ColouredNoise: Finding,
 }
 
 /// What the catalogue says of one effect.
@@ -117,8 +147,8 @@ pub struct Entry {
     pub driven: bool,
     /// Whether a model may have it more than once: two lines, two columns, a finer function of time.
     pub repeats: bool,
-    /// The blocks that the search tries before a base model.
-    pub(crate) candidates: fn(&Situation) -> Vec<Candidate>,
+    /// The blocks that the search tries on a base model; none of a finding.
+    pub(crate) proposals: fn(&Situation) -> Vec<Proposal<Effect>>,
 }
 
 impl std::fmt::Debug for Entry {
@@ -128,15 +158,139 @@ impl std::fmt::Debug for Entry {
 }
 
 impl Effect {
-    /// Its entry in the catalogue.
-    pub fn entry(&self) -> &'static Entry {
-        let name = self.block().name();
-        // every variant comes from the catalogue
-        CATALOGUE.iter().find(|entry| entry.name == name).unwrap_or(&CATALOGUE[0])
-    }
-
     /// Its name, such as `creep`.
     pub fn name(&self) -> &'static str {
-        self.block().name()
+        self.entry().name
+    }
+
+    /// The stage of the chain.
+    pub fn stage(&self) -> Stage {
+        self.place().stage()
+    }
+
+    /// What every effect that acts in the chain has; `None` for a finding.
+    pub fn block(&self) -> Option<&dyn Block> {
+        self.place().block()
+    }
+
+    /// The estimated values; none of a finding.
+    pub fn values(&self) -> Vec<f64> {
+        self.block().map_or_else(Vec::new, Block::values)
+    }
+
+    /// Takes other values, as many as [`Effect::values`] returns.
+    pub(crate) fn set(&mut self, values: &[f64]) {
+        if let Some(block) = self.place_mut().block() {
+            block.set(values);
+        }
+    }
+
+    /// The parameters as an engineer reads them, with their units.
+    pub fn quantities(&self, units: Units) -> Vec<Quantity> {
+        match self.place() {
+            Place::Finding(own) => own.quantities(units),
+            place => place.block().map_or_else(Vec::new, |own| own.quantities(units)),
+        }
+    }
+
+    /// The same on the other side of the output stage, if it is an added signal.
+    pub(crate) fn elsewhere(&self) -> Option<Self> {
+        let mut moved = self.clone();
+        let PlaceMut::Added(own) = moved.place_mut() else { return None };
+        own.set_moves_stage(!own.moves_stage());
+        Some(moved)
+    }
+}
+
+impl Proposal<Effect> {
+    /// Proposals of one kind of block as those of effects.
+    pub(crate) fn all<B: Into<Effect>>(found: Vec<Proposal<B>>) -> Vec<Self> {
+        let effect = |Proposal { block, probes, linear }: Proposal<B>| Self {
+            block: block.into(),
+            probes: probes.into_iter().map(Into::into).collect(),
+            linear,
+        };
+        found.into_iter().map(effect).collect()
+    }
+
+    /// The same on the other side of the output stage, if it is an added signal.
+    pub(crate) fn elsewhere(&self) -> Option<Self> {
+        let probes: Option<Vec<Effect>> = self.probes.iter().map(Effect::elsewhere).collect();
+        Some(Self { block: self.block.elsewhere()?, probes: probes?, linear: self.linear })
+    }
+
+    /// The effect with the values that a least squares fit of the probes' columns gives.
+    pub(crate) fn start(&self, coefficients: &[f64]) -> Effect {
+        let mut effect = self.block.clone();
+        if self.linear {
+            let mut values = effect.values();
+            let zero = values.clone();
+            for (probe, coefficient) in self.probes.iter().zip(coefficients) {
+                for ((value, zero), moved) in values.iter_mut().zip(&zero).zip(probe.values()) {
+                    *value += coefficient * (moved - zero);
+                }
+            }
+            effect.set(&values);
+        }
+        effect
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear::{Section, Sections};
+    use crate::{Channel, Experiment, Matrix, Record};
+
+    /// Calls `ask` with a situation in which every effect but the findings has proposals.
+    fn situation(ask: impl FnOnce(&Situation)) {
+        let signal = |f: fn(f64) -> f64| Matrix::from_fn(1000, 1, |k, _| f(k as f64));
+        let (input, covariates) = (signal(|k| (0.01 * k * k).sin()), signal(|k| (0.03 * k).cos()));
+        let run =
+            Experiment { output: input.clone(), input, covariates, warmup: 0, held_out: vec![] };
+        let channel = |name| vec![Channel::new(name, "")];
+        let signals = [run.input.clone()];
+        let record =
+            Record::new(vec![run], 100.0, channel("u"), channel("y"), channel("x")).unwrap();
+        let (b, c) = (Matrix::from_element(2, 1, 0.1), Matrix::from_row_slice(1, 2, &[1.0, 0.0]));
+        let mode = Section { a: vec![-1.2, 0.6], b, c, reference: 0, beside: None };
+        ask(&Situation {
+            record: &record,
+            drives: &signals,
+            intermediates: &signals,
+            displacements: &signals,
+            residuals: &signals,
+            dynamics: &Sections { sections: vec![mode], ..Sections::default() },
+            loops: Vec::new(),
+            widest: vec![0.5],
+            places: vec![(-1.0, 1.0)],
+        });
+    }
+
+    #[test]
+    fn the_stage_of_every_entry_is_that_of_its_place() {
+        let agrees = |effect: &Effect, entry: &Entry| {
+            assert_eq!((effect.name(), effect.stage()), (entry.name, entry.stage));
+            assert_eq!(serde_json::to_value(effect).unwrap()["name"], entry.name);
+        };
+        situation(|situation| {
+            for entry in CATALOGUE {
+                let found = (entry.proposals)(situation);
+                assert_eq!(found.is_empty(), entry.stage == Stage::Noise, "{}", entry.name);
+                for proposal in found {
+                    agrees(&proposal.block, entry);
+                    if let Some(moved) = proposal.block.elsewhere() {
+                        assert_eq!(moved.stage(), Stage::Displaced);
+                        assert_eq!(moved.elsewhere(), Some(proposal.block));
+                    }
+                }
+            }
+        });
+        let (coefficients, innovation, deviation) = (vec![0.5], 1.0, 1.2);
+        let findings: [Effect; 2] = [
+            Outliers { count: 1, samples: 10, size: 1.0 }.into(),
+            ColouredNoise { output: 0, coefficients, innovation, deviation }.into(),
+        ];
+        findings.iter().for_each(|effect| agrees(effect, effect.entry()));
     }
 }

@@ -1,18 +1,18 @@
 //! Isolated wrong samples.
+//!
+//! Samples that differ from their neighbours by far more than the noise, (E14) in the documentation's theory.
+//! The fit limits their influence by Huber's loss; here they are only counted.
 
-use super::{Block, Candidate, Quantity, Situation, Stage, Units};
+use super::{Finding, Quantity, Stage, Units};
 
-/// Samples that stand apart from their neighbours by far more than the noise; the fit counts them by
-/// Huber's loss.
-///
-/// (E14) in the documentation's theory.
+/// Isolated samples that differ from their neighbours by far more than the noise.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outliers {
-    /// How many there are.
+    /// Their number.
     pub count: usize,
-    /// Of how many samples.
+    /// The number of all samples.
     pub samples: usize,
-    /// Root mean square of what they are off by, in the output's unit.
+    /// Root mean square of their errors, in the output's unit.
     pub size: f64,
 }
 
@@ -22,34 +22,11 @@ impl Outliers {
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = false;
-
-    /// None: they are counted in the residual.
-    pub(super) fn candidates(_: &Situation) -> Vec<Candidate> {
-        Vec::new()
-    }
 }
 
-impl Block for Outliers {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        0
-    }
-
-    fn values(&self) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn set(&mut self, _: &[f64]) {}
-
-    fn steps(&self) -> Vec<f64> {
-        Vec::new()
+impl Finding for Outliers {
+    fn output(&self) -> Option<usize> {
+        None
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {

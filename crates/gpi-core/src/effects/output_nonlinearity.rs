@@ -1,17 +1,19 @@
-//! A sensor's curve.
+//! A static curve after G, such as that of the sensor.
+//!
+//! `y = x + s sum_m c_m ((x - m_0) / s)^m`, m = 2, 3, .., (E8) in the documentation's theory, with the middle
+//! m_0 and half the span s of the displacement x. There is no term of degree 1, because the play weights hold
+//! that gain.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units};
+use super::{Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units};
 
-/// `y = x + s sum_m c_m ((x - m) / s)^m`, m = 2 ..: a static curve after G, its slope carried by the plays.
-///
-/// (E8) in the documentation's theory.
+/// The reading is a polynomial of the displacement: `y = x + s sum_m c_m ((x - m_0) / s)^m`, m = 2, 3, ..
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OutputNonlinearity {
     /// The output that is read through the curve.
     pub output: usize,
     /// c_2, c_3, ..
     pub coefficients: Vec<f64>,
-    /// The middle of the displacement.
+    /// m_0, the middle of the displacement.
     pub middle: f64,
     /// s, half its span.
     pub scale: f64,
@@ -24,7 +26,7 @@ impl OutputNonlinearity {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let block = |output, terms: usize| {
             let (low, high) = Situation::range(situation.displacements, output);
             let (middle, scale) = (0.5 * (low + high), 0.5 * (high - low));
@@ -32,28 +34,11 @@ impl OutputNonlinearity {
         };
         let blocks =
             situation.outputs().flat_map(|output| [2, 4].map(|terms| block(output, terms)));
-        let usable = |block: &Self| block.scale > 0.0;
-        let candidate = |block: Self| {
-            let terms = block.coefficients.len();
-            Candidate::linear(block, 0..terms)
-        };
-        blocks.filter(usable).map(candidate).collect()
+        blocks.filter(|block| block.scale > 0.0).map(Proposal::linear_in_all).collect()
     }
 }
 
 impl Block for OutputNonlinearity {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         self.coefficients.clone()
     }
@@ -71,6 +56,12 @@ impl Block for OutputNonlinearity {
             Quantity::new(format!("curve[{}]", i + 2), units.output, c * self.scale)
         };
         self.coefficients.iter().enumerate().map(term).collect()
+    }
+}
+
+impl OutputStage for OutputNonlinearity {
+    fn output(&self) -> usize {
+        self.output
     }
 
     fn sense(&self, _: &mut [f64], output: f64, _: Moment) -> (f64, Slope) {

@@ -1,16 +1,17 @@
-//! A line that the input does not drive.
+//! A line in the spectrum that the input does not drive, such as mains hum, a pump or a vibration.
+//!
+//! `y += a cos(2 pi f t) + b sin(2 pi f t)`, (E12) in the documentation's theory. An amplitude `A cos(2 pi f
+//! t + phi)` has `a = A cos phi` and `b = -A sin phi`.
 
-use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
+use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
 use crate::spectrum::{Strongest, near, peak, power};
 
-/// `y += a cos(2 pi f t) + b sin(2 pi f t)`: mains hum, a pump, a vibration.
-///
-/// (E12) in the documentation's theory.
+/// A sinusoid is added: `y += a cos(2 pi f t) + b sin(2 pi f t)`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PeriodicDisturbance {
-    /// The output that it adds to.
+    /// The output to which it is added.
     pub output: usize,
-    /// Whether it moves the stage, before the output stage, and not only the reading.
+    /// Whether it is a disturbance at the plant's output, before the sensor.
     #[serde(default)]
     pub moves_stage: bool,
     /// f in Hz.
@@ -19,9 +20,9 @@ pub struct PeriodicDisturbance {
     pub cosine: f64,
     /// b, in the output's unit.
     pub sine: f64,
-    /// Seconds of the record, which say how far the frequency may be off.
+    /// Length of the record in seconds, which bounds the error of the frequency.
     pub duration: f64,
-    /// The span of the output, which steps are counted from.
+    /// The span of the output, which scales the steps.
     pub span: f64,
 }
 
@@ -33,8 +34,8 @@ impl PeriodicDisturbance {
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
 
-    /// The line of the residual's spectrum that stands out most from its neighbours.
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    /// The line of the residual's spectrum with the largest ratio to its neighbours.
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let duration = situation.duration();
         let block = |output: usize| {
             let frequency = outstanding(situation, output)?;
@@ -48,16 +49,16 @@ impl PeriodicDisturbance {
                 duration,
                 span,
             };
-            Some(Candidate::linear(block, 1..3))
+            Some(Proposal::linear(block, 1..3))
         };
         situation.outputs().filter_map(block).collect()
     }
 }
 
-/// The frequency of the residual's line with the largest power over the median around it, interpolated
-/// between the lines of a Hann window.
+/// The frequency of the residual's line with the largest ratio of its power to the median around it,
+/// interpolated between the lines of a Hann window.
 fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
-    /// Slower lines are drift.
+    /// A line of fewer periods cannot be told from drift.
     const FEWEST_PERIODS: usize = 20;
     const AROUND: usize = 50;
     let place = (0..situation.residuals.len()).max_by_key(|&i| situation.residuals[i].nrows())?;
@@ -68,7 +69,7 @@ fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
     let is_driven = |line: usize| driven.as_ref().is_some_and(|most| most[line] > power[line]);
     let mut best: Option<(f64, usize)> = None;
     let mut first = FEWEST_PERIODS;
-    // The median of a piece stands for its background.
+    // the median of a piece estimates its background
     while first + AROUND < power.len() {
         let last = (first + 2 * AROUND).min(power.len());
         let mut piece = power[first..last].to_vec();
@@ -86,12 +87,12 @@ fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
     Some(peak(&power, line) * situation.record.rate() / n as f64)
 }
 
-/// Where the one input is little but one line (a sine, a triangle): the power that a misfit of what it drives
-/// may have at each line. A line that is no stronger says nothing of a disturbance.
+/// The power that an error of the model may have at each line, where the only input has most of its power in
+/// one line (a sine, a triangle). A weaker line is no evidence of a disturbance.
 fn driven(situation: &Situation, experiment: usize, output: usize) -> Option<Vec<f64>> {
-    /// The n-th harmonic of a misfit is at most this over n of the displacement's fundamental.
+    /// The n-th harmonic of an error of the model is at most this over n of the displacement's fundamental.
     const MISFIT: f64 = 0.02;
-    /// Part of the input's power.
+    /// Smallest part of the input's power in its strongest line.
     const MOST: f64 = 0.9;
     let [drive] = situation.drives[experiment].column_iter().collect::<Vec<_>>()[..] else {
         return None;
@@ -109,22 +110,6 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Option<Vec
 }
 
 impl Block for PeriodicDisturbance {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        if self.moves_stage { Stage::Displaced } else { Self::STAGE }
-    }
-
-    fn elsewhere(&self) -> Option<Effect> {
-        Some(Self { moves_stage: !self.moves_stage, ..self.clone() }.into())
-    }
-
-    fn channel(&self) -> usize {
-        self.output
-    }
-
     fn values(&self) -> Vec<f64> {
         vec![self.frequency, self.cosine, self.sine]
     }
@@ -150,14 +135,30 @@ impl Block for PeriodicDisturbance {
             Quantity::new("phase", "rad", (-self.sine).atan2(self.cosine)),
         ]
     }
+}
 
-    /// Samples since the phase was worked out anew, its cosine and sine, and those of one sample's turn.
-    fn rest(&self, _: f64, moment: Moment) -> Vec<f64> {
+impl Added for PeriodicDisturbance {
+    fn output(&self) -> usize {
+        self.output
+    }
+
+    fn moves_stage(&self) -> bool {
+        self.moves_stage
+    }
+
+    fn set_moves_stage(&mut self, moves_stage: bool) {
+        self.moves_stage = moves_stage;
+    }
+
+    /// Samples since the phase was computed from the time, its cosine and sine, and those of the phase step
+    /// of one sample.
+    fn rest(&self, moment: Moment) -> Vec<f64> {
         let (sine, cosine) = (std::f64::consts::TAU * self.frequency / moment.rate).sin_cos();
         vec![0.0, 1.0, 0.0, cosine, sine]
     }
 
-    /// A turn costs less than a sine; the phase is worked out anew before rounding can add up.
+    /// Rotating the phase costs less than a sine; it is computed from the time again before rounding errors
+    /// add up.
     fn add(&self, state: &mut [f64], moment: Moment) -> f64 {
         const TURNS: f64 = 64.0;
         if state[0] == 0.0 {
@@ -189,11 +190,11 @@ mod tests {
         };
         let rate = 2000.0;
         let moment = |k: u32| Moment { time: f64::from(k) / rate, rate, covariates: &[] };
-        let mut state = line.rest(0.0, moment(0));
+        let mut state = line.rest(moment(0));
         for k in 0..120_000 {
             let phase = std::f64::consts::TAU * line.frequency * moment(k).time;
             let exact = 0.3 * phase.cos() - 0.7 * phase.sin();
-            // the phase itself is as wrong as its last digit
+            // the phase itself is rounded
             let rounding = 1e-13 + 3e-16 * phase;
             assert!((line.add(&mut state, moment(k)) - exact).abs() < rounding, "sample {k}");
         }

@@ -1,14 +1,16 @@
-//! Half-widths that grow with speed.
+//! Half-widths of the plays that grow with the speed of the drive.
+//!
+//! `r(k) = r (1 + a g(s)) + b g(s)` for every play of half-width r > 0, (E3) in the documentation's theory,
+//! with the speed `s = |du/dt|`. The hysteresis loop opens with the speed: in proportion to the half-width
+//! (a), by the same width for all plays (b), or both.
+//!
+//! `g(s) = s`, or with a [`SpeedLaw`] the transformation of Box and Cox (1964),
+//! `g(s) = s_0 ((1 + s/s_0)^e - 1) / e`. Its slope at s = 0 is 1; beyond the knee s_0 it grows more slowly.
+//! The law sees s through a first-order lag.
 
-use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
+use super::{Block, PlayWidths, Proposal, Quantity, Situation, Stage, Units};
 
-/// `r(k) = r (1 + a g(s)) + b g(s)` for every play of half-width r > 0, s the speed |du/dt|: loops open
-/// with speed, in proportion to the half-width, by the same width, or both.
-///
-/// `g(s) = s`, or with a [`SpeedLaw`] `g(s) = s_0 ((1 + s / s_0)^e - 1) / e`, which starts as s and then
-/// grows slower.
-///
-/// (E3) in the documentation's theory.
+/// Half-widths grow with the speed s of the drive: `r (1 + a g(s)) + b g(s)`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RateDependence {
     /// The input whose hysteresis it is.
@@ -17,24 +19,23 @@ pub struct RateDependence {
     pub relative: f64,
     /// b, in seconds.
     pub absolute: f64,
-    /// How g bends; straight without it.
+    /// The law g; `g(s) = s` without it.
     pub law: Option<SpeedLaw>,
-    /// The speed that brings a or b to bear, in the input's unit per second: where steps are counted
-    /// from.
+    /// The root mean square speed in the input's unit per second, which scales the steps.
     pub speed: f64,
     /// Half-width of the widest play.
     pub widest: f64,
 }
 
-/// Box and Cox's family of laws: straight for e = 1, a power for e between 0 and 1 beyond a small s_0,
-/// logarithmic for e = 0, and an end at s_0 for e = -1.
+/// The law of Box and Cox: linear for e = 1, close to a power s^e for e between 0 and 1 and s well above s_0,
+/// logarithmic for e = 0, and bounded by s_0 for e = -1.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SpeedLaw {
     /// e.
     pub exponent: f64,
-    /// s_0, where the law begins to bend, in the input's unit per second.
+    /// s_0, in the input's unit per second.
     pub knee: f64,
-    /// Time constant in seconds of the first-order lag behind which s is seen.
+    /// Time constant in seconds of the first-order lag of s.
     pub lag: f64,
 }
 
@@ -56,7 +57,7 @@ impl RateDependence {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         /// Exponents, and knees over the median speed.
         const LAWS: [(f64, f64); 4] = [(0.4, 0.03), (0.0, 0.1), (0.0, 1.0), (-1.0, 1.0)];
         /// Seconds.
@@ -72,34 +73,22 @@ impl RateDependence {
             (block, usual)
         };
         let usable = |(block, usual): &(Self, f64)| *usual > 0.0 && block.widest > 0.0;
-        let mut candidates = Vec::new();
+        let mut proposals = Vec::new();
         for (block, usual) in situation.inputs().map(block).filter(usable) {
             let straight = [vec![0], vec![1], vec![0, 1]];
-            candidates.extend(straight.map(|places| Candidate::linear(block.clone(), places)));
+            proposals.extend(straight.map(|places| Proposal::linear(block.clone(), places)));
             for (exponent, knee) in LAWS {
                 for lag in LAGS {
                     let law = Some(SpeedLaw { exponent, knee: knee * usual, lag });
-                    candidates.push(Candidate::linear(Self { law, ..block.clone() }, [0, 1]));
+                    proposals.push(Proposal::linear(Self { law, ..block.clone() }, [0, 1]));
                 }
             }
         }
-        candidates
+        proposals
     }
 }
 
 impl Block for RateDependence {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        self.input
-    }
-
     fn values(&self) -> Vec<f64> {
         let law = self.law.map(|law| [law.exponent, law.knee.ln(), law.lag]);
         [self.relative, self.absolute].into_iter().chain(law.into_iter().flatten()).collect()
@@ -121,7 +110,7 @@ impl Block for RateDependence {
     }
 
     fn steps(&self) -> Vec<f64> {
-        // where the law bends, growth at the usual speed is less than the speed
+        // g is smaller than s above the knee
         let speed = self.law.map_or(self.speed, |law| law.growth(self.speed));
         let law = self.law.map(|law| [1e-3, 1e-3, (1e-2 * law.lag).max(1e-5)]);
         let law = law.into_iter().flatten();
@@ -143,8 +132,14 @@ impl Block for RateDependence {
         }
         quantities
     }
+}
 
-    fn rest(&self, _: f64, _: Moment) -> Vec<f64> {
+impl PlayWidths for RateDependence {
+    fn input(&self) -> usize {
+        self.input
+    }
+
+    fn rest(&self) -> Vec<f64> {
         vec![0.0]
     }
 
@@ -161,7 +156,7 @@ impl Block for RateDependence {
         }
         let factor = 1.0 + self.relative * speed_seen;
         let width = half_width * factor + self.absolute * speed_seen;
-        // a growth of either sign may be tried, a negative width has no meaning
+        // the fit may try a negative growth, but no half-width is negative
         if width > 0.0 { (width, factor) } else { (0.0, 0.0) }
     }
 }

@@ -1,19 +1,29 @@
-//! A resonance that moves with amplitude.
+//! A resonance that moves with the amplitude.
+//!
+//! A restoring force that is not proportional to the displacement acts inside the mechanics, (E7) in the
+//! documentation's theory: `x+ = A x + B v + E w`, `w = law(S x + T v)`, see [`InnerLoop`].
+//!
+//! - Powers of the displacement are Duffing's oscillator (a cube) or a force that differs between the two
+//!   directions (a square).
+//! - Stops are hysteresis inside the loop: the mechanics become softer and more damped as the amplitude
+//!   grows.
+//!
+//! Around several outputs, the signals `S x + T v` are mixtures: of the displacements first, then of what
+//! drives them (see `loop_signals`).
+//!
+//! The values of a loop are its column of E, its rows of S and T, the logarithms of its half-widths and its
+//! weights. The product of E, the scale of the signal and the scale of w is what the output shows; therefore
+//! the largest element of S and T (powers) or the widest half-width and the last weight (stops) are held.
 
 use super::loop_signals::{LoopSignal, Shape, families};
-use super::{Block, Candidate, InnerLoop, Law, Quantity, Sees, Situation, Stage, Units};
+use super::{
+    Block, ClosedLoops, InnerLoop, Law, Proposal, Quantity, Sees, Situation, Stage, Units,
+};
 
-/// Loops around G: a restoring force that is not in proportion to the displacement acts inside the
-/// mechanics, `x+ = A x + B v + E w`, `w = law(S x + T v)`.
-///
-/// Powers of the displacement make Duffing's oscillator (a cube) or directions that differ (a square); stops
-/// make hysteresis inside the loop, which softens the mechanics and damps them as the amplitude grows. Around
-/// several outputs z mixes the states: of the displacements first, then of what drives them.
-///
-/// (E7) in the documentation's theory.
+/// Nonlinear loops around G: `x+ = A x + B v + E w`, `w = law(S x + T v)`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Stiffness {
-    /// At least one.
+    /// The loops, at least one.
     pub loops: Vec<InnerLoop>,
 }
 
@@ -25,8 +35,8 @@ impl Stiffness {
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
 
-    pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
-        // A lag has no resonance to move.
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
+        // a first-order lag has no resonance
         if situation.dynamics.order() < 2 {
             return Vec::new();
         }
@@ -38,8 +48,8 @@ impl Stiffness {
     }
 }
 
-/// A cube of the displacement, and a square beside it.
-fn powers(situation: &Situation) -> Vec<Candidate> {
+/// A cube of the displacement alone, and a cube with a square.
+fn powers(situation: &Situation) -> Vec<Proposal<Stiffness>> {
     let order = situation.dynamics.order();
     // half the span of the displacement
     let scale = 0.5 * situation.span(0);
@@ -52,11 +62,15 @@ fn powers(situation: &Situation) -> Vec<Candidate> {
         drives: vec![0.0; order],
     };
     let block = Stiffness { loops: [2, 3].map(power).to_vec() };
-    [order..2 * order, 0..2 * order].map(|places| Candidate::linear(block.clone(), places)).to_vec()
+    [order..2 * order, 0..2 * order].map(|places| Proposal::linear(block.clone(), places)).to_vec()
 }
 
 /// Loops through these signals.
-fn around(shape: Shape, signals: &[LoopSignal], situation: &Situation) -> Option<Candidate> {
+fn around(
+    shape: Shape,
+    signals: &[LoopSignal],
+    situation: &Situation,
+) -> Option<Proposal<Stiffness>> {
     /// Half-widths over the root mean square.
     const HALF_WIDTHS: [f64; 3] = [0.15, 0.5, 1.5];
     let order = situation.dynamics.order();
@@ -80,19 +94,19 @@ fn around(shape: Shape, signals: &[LoopSignal], situation: &Situation) -> Option
         places.extend(first..first + order);
         first += values_of(inner);
     }
-    (!places.is_empty()).then(|| Candidate::linear(block, places))
+    (!places.is_empty()).then(|| Proposal::linear(block, places))
 }
 
-/// How many values a loop has.
+/// The number of values of a loop.
 fn values_of(inner: &InnerLoop) -> usize {
     Stiffness { loops: vec![inner.clone()] }.values().len()
 }
 
-/// A run of values of a loop.
+/// Values of a loop that have the same form.
 enum Group<'a> {
-    /// As they are.
+    /// The numbers themselves.
     Plain(&'a mut Vec<f64>),
-    /// Positive numbers by their logarithms.
+    /// The logarithms of positive numbers.
     Logarithms(&'a mut Vec<f64>),
 }
 
@@ -109,21 +123,6 @@ fn groups(inner: &mut InnerLoop) -> Vec<Group<'_>> {
 }
 
 impl Block for Stiffness {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn stage(&self) -> Stage {
-        Self::STAGE
-    }
-
-    fn channel(&self) -> usize {
-        match self.loops.first().map(|inner| &inner.sees) {
-            Some(Sees::Output(output)) => *output,
-            _ => 0,
-        }
-    }
-
     fn values(&self) -> Vec<f64> {
         let mut values = Vec::new();
         for inner in &mut self.loops.clone() {
@@ -165,17 +164,16 @@ impl Block for Stiffness {
                 bounds.extend(free(states.len() + inputs.len()));
                 let largest =
                     seen().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-                // of a power, whose scale is in its drives as well
+                // a power's scale is in its drives as well
                 if let (Some((place, value)), Law::Power { .. }) = (largest, &inner.law) {
                     let first = bounds.len() - seen().count();
                     bounds[first + place] = (value, value);
                 }
             }
             if let Law::Stops { half_widths, weights } = &inner.law {
-                /// Of the logarithms: beyond a thousandth of the widest stop, or a thousand times it, the
-                /// others are stops no longer.
+                /// Largest distance of a half-width from the widest one, in logarithms: a factor of a thousand.
                 const REACH: f64 = 6.9;
-                /// How far a step may take a logarithm or a weight.
+                /// The largest step of a logarithm or a weight.
                 const STEP: f64 = 0.7;
                 let near = |value: f64| (value - STEP, value + STEP);
                 // the widest stop sets the scales of z and of w
@@ -194,14 +192,6 @@ impl Block for Stiffness {
             }
         }
         bounds
-    }
-
-    fn loops(&self) -> &[InnerLoop] {
-        &self.loops
-    }
-
-    fn loops_mut(&mut self) -> &mut [InnerLoop] {
-        &mut self.loops
     }
 
     fn quantities(&self, _: Units) -> Vec<Quantity> {
@@ -223,5 +213,15 @@ impl Block for Stiffness {
             }
         }
         found
+    }
+}
+
+impl ClosedLoops for Stiffness {
+    fn loops(&self) -> &[InnerLoop] {
+        &self.loops
+    }
+
+    fn loops_mut(&mut self) -> &mut [InnerLoop] {
+        &mut self.loops
     }
 }

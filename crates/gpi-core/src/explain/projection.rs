@@ -4,7 +4,7 @@ use super::score::Base;
 use crate::chain::free_run::Signals;
 use crate::chain::stream::{Rows, Stream};
 use crate::chain::table::Group;
-use crate::effects::{Candidate, Effect, Stage};
+use crate::effects::{Effect, Proposal, Stage};
 use crate::fit::gather::gather;
 use crate::fit::problem::Estimation;
 use crate::optimize::{LeastSquares, Linearization};
@@ -90,12 +90,12 @@ impl Base<'_> {
     /// for what has no loops.
     pub(super) fn loops_projected(
         &self,
-        candidate: &Candidate,
+        candidate: &Proposal<Effect>,
     ) -> Result<Option<Projection>, Error> {
-        let block = candidate.block.block();
         let point = self.point.with_effect(candidate.block.clone());
         let place = point.effects.iter().position(|own| *own == candidate.block);
-        let Some(place) = place.filter(|_| candidate.linear && !block.loops().is_empty()) else {
+        let loops = candidate.block.place().closed_loops();
+        let (Some(place), Some(block), true) = (place, loops, candidate.linear) else {
             return Ok(None);
         };
         let mut check = || Ok(());
@@ -106,7 +106,7 @@ impl Base<'_> {
         let known: Vec<usize> = (0..table.len).filter(|i| !inserted.contains(i)).collect();
         let (values, steps) = (block.values(), block.steps());
         let moved = |probe: &Effect| {
-            let pairs = probe.block().values().into_iter().zip(&values);
+            let pairs = probe.values().into_iter().zip(&values);
             pairs.into_iter().position(|(probe, value)| probe != *value)
         };
         let own: Vec<usize> = candidate.probes.iter().filter_map(moved).collect();
@@ -155,7 +155,8 @@ mod tests {
         let square = Law::Power { exponent: 2, scale: 1.5 };
         let block = Stiffness { loops: vec![inner(stops), inner(square)] };
         // drives of the first loop, and of the second behind what the first one sees and weighs
-        let candidate = Candidate::linear(block, (0..3).chain(12..15));
+        let candidate =
+            Proposal::all(vec![Proposal::linear(block, (0..3).chain(12..15))]).remove(0);
         let found = base.loops_projected(&candidate).unwrap().unwrap();
         let columns = |known: &Signals, here: &Matrix, own: &Experiment, index: usize| {
             let gained = |probe: &Effect| point.gained_by(probe, known, here, own, index);

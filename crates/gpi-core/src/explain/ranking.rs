@@ -5,7 +5,7 @@ use super::search::Search;
 use crate::Error;
 use crate::chain::point::Point;
 use crate::chain::table::Table;
-use crate::effects::{Candidate, Entry};
+use crate::effects::{Entry, Proposal};
 use crate::fit::representatives::representatives;
 use crate::progress::{Progress, report};
 
@@ -59,10 +59,9 @@ impl Search<'_> {
             |entry: &&&Entry| of_use(entry) && is_told(entry) && (entry.repeats || !present(entry));
         let (mut entries, mut candidates) = (Vec::new(), Vec::new());
         for &entry in families.iter().filter(usable) {
-            let found = base.situation(entry.candidates);
+            let found = base.situation(entry.proposals);
             // before and behind the output stage is the same where there is none
-            let elsewhere =
-                found.iter().filter_map(Candidate::elsewhere).filter(|_| point.senses());
+            let elsewhere = found.iter().filter_map(Proposal::elsewhere).filter(|_| point.senses());
             candidates.extend(elsewhere.collect::<Vec<_>>());
             candidates.extend(found);
             entries.resize(candidates.len(), entry);
@@ -92,7 +91,7 @@ pub(super) const SLOW: [&str; 2] = ["drift", "gain-drift"];
 /// places before tells: else it follows something that is not slow.
 fn is_slow(scores: &[Score], place: usize) -> bool {
     const MOST: f64 = 0.75;
-    let knots = |score: &Score| score.start.block().values().len();
+    let knots = |score: &Score| score.start.values().len();
     let score = &scores[place];
     let coarser = place.checked_sub(2).map(|place| &scores[place]);
     let coarser = coarser.filter(|coarser| 4 * knots(coarser) == knots(score));

@@ -20,7 +20,7 @@ impl Search<'_> {
         }
         let record = &self.prepared.record;
         for place in 0..self.point.effects.len() {
-            let Some(other) = self.point.effects[place].block().elsewhere() else { continue };
+            let Some(other) = self.point.effects[place].elsewhere() else { continue };
             let moved = self.point.without_effect(place).with_effect(other);
             let fitted = fit(moved, record, &self.options, "rearrangement", progress)?;
             if fitted.linearization.cost < (1.0 - LEAST) * self.cost {

@@ -4,7 +4,7 @@ use super::projection::{LEFT, Projection};
 use crate::chain::free_run::Signals;
 use crate::chain::point::{Freedom, Point};
 use crate::chain::table::Table;
-use crate::effects::{Candidate, Effect, Situation};
+use crate::effects::{Effect, Place, Proposal, Situation};
 use crate::fit::problem::Estimation;
 use crate::optimize::{LeastSquares, Linearization, Loss};
 use crate::uncertainty::covariance::descending_eigen;
@@ -29,7 +29,7 @@ pub(crate) struct Score {
 /// sensitivities, takes a part of what is left of the residual.
 pub(crate) fn scores(
     base: &Base,
-    candidates: &[Candidate],
+    candidates: &[Proposal<Effect>],
     check: &mut dyn FnMut(f64) -> Result<(), Error>,
 ) -> Result<Vec<Score>, Error> {
     /// Numbers that the columns held at once may take.
@@ -40,7 +40,7 @@ pub(crate) fn scores(
         check(scores.len() as f64 / candidates.len() as f64)?;
         let rest = &candidates[scores.len()..];
         let mut filled = first.probes.len();
-        let fits = |candidate: &&Candidate| {
+        let fits = |candidate: &&Proposal<Effect>| {
             filled += candidate.probes.len();
             filled <= columns
         };
@@ -137,7 +137,7 @@ impl<'a> Base<'a> {
     }
 
     /// Scores of a few candidates.
-    fn score(&self, candidates: &[Candidate]) -> Result<Vec<Score>, Error> {
+    fn score(&self, candidates: &[Proposal<Effect>]) -> Result<Vec<Score>, Error> {
         /// Probes whose derivatives are faster all at once than one after the other.
         const MANY: usize = 50;
         if let [candidate] = candidates
@@ -154,7 +154,7 @@ impl<'a> Base<'a> {
         };
         let projection = self.project(probes, &columns)?;
         let mut first = 0;
-        let place = |candidate: &Candidate| {
+        let place = |candidate: &Proposal<Effect>| {
             first += candidate.probes.len();
             scored(candidate, first - candidate.probes.len(), &projection)
         };
@@ -164,14 +164,15 @@ impl<'a> Base<'a> {
     /// What the output gains by each probe of a candidate; `here` is the output.
     fn columns(
         &self,
-        candidate: &Candidate,
+        candidate: &Proposal<Effect>,
         known: &Signals,
         here: &Matrix,
         experiment: &Experiment,
         index: usize,
     ) -> Result<Vec<Matrix>, Error> {
-        let block = candidate.block.block();
-        if candidate.linear && block.reads() {
+        if candidate.linear
+            && let Place::Curves(block) = candidate.block.place()
+        {
             let point = self.point.with_effect(candidate.block.clone());
             let Some(place) = point.effects.iter().position(|own| *own == candidate.block) else {
                 return Ok(Vec::new());
@@ -185,7 +186,7 @@ impl<'a> Base<'a> {
 }
 
 /// What a candidate would take, whose columns begin at `first`.
-fn scored(candidate: &Candidate, first: usize, projection: &Projection) -> Score {
+fn scored(candidate: &Proposal<Effect>, first: usize, projection: &Projection) -> Score {
     let Projection { left, score, squares, cost } = projection;
     let places: Vec<usize> = (first..first + candidate.probes.len())
         .filter(|&i| left[(i, i)] > LEFT * squares[i])

@@ -6,7 +6,7 @@ use super::search::Search;
 use crate::Progress;
 use crate::chain::point::Point;
 use crate::chain::table::Table;
-use crate::effects::{Entry, Stage};
+use crate::effects::{ClosedLoops, Effect, Entry, Stage};
 use crate::fit::minimize::{FitOptions, Fitted, fit};
 use crate::fit::refine::Refined;
 use crate::fit::representatives::representatives;
@@ -121,10 +121,12 @@ impl Search<'_> {
         const BEYOND_PLAYS: f64 = 1.0;
         let start = base.with_effect(score.start.clone());
         let Some(zero) = score.zero else { return Ok(start) };
-        let block = score.start.block();
-        let mut limits = block.values().into_iter().zip(block.bounds());
-        let is_sensible = limits.all(|(value, (low, high))| low <= value && value <= high);
-        let has_plays = block.loops().iter().any(|inner| inner.law.stops() > 0);
+        let is_sensible = score.start.block().is_none_or(|block| {
+            let mut limits = block.values().into_iter().zip(block.bounds());
+            limits.all(|(value, (low, high))| low <= value && value <= high)
+        });
+        let loops = score.start.place().closed_loops().map_or(&[][..], ClosedLoops::loops);
+        let has_plays = loops.iter().any(|inner| inner.law.stops() > 0);
         let beyond = if has_plays { BEYOND_PLAYS } else { BEYOND };
         let is_near = self.training_squares(&start)? <= beyond * self.training_squares(base)?;
         Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })
@@ -140,7 +142,8 @@ impl Search<'_> {
         let record = &self.prepared.record;
         let longest = record.experiments().iter().map(|e| e.input.nrows()).max();
         let duration = longest.unwrap_or(0) as f64 / record.rate();
-        point.blocks().iter().all(|effect| effect.block().is_plausible(duration))
+        let blocks = point.blocks();
+        blocks.iter().filter_map(Effect::block).all(|block| block.is_plausible(duration))
     }
 
     /// What a fit brought over the present model; `without` is what the effect was added to.

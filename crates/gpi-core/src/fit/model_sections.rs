@@ -1,14 +1,14 @@
 //! The dynamics of a model as sections, with the loops around them in the same coordinates.
 
-use crate::effects::{Block, Effect, InnerLoop, Sees};
+use crate::effects::{ClosedLoops, Effect, InnerLoop, PlaceMut, Sees};
 use crate::linear::{Sections, StateSpace};
 use crate::{Error, Matrix, Model};
 
 /// G, and the model's effects whose loops drive and see the states of the sections.
 pub(crate) fn sections_of(model: &Model) -> Result<(Sections, Vec<Effect>), Error> {
     let mut effects = model.effects().to_vec();
-    let blocks = model.effects().iter().map(Effect::block);
-    let loops: Vec<&InnerLoop> = blocks.flat_map(Block::loops).collect();
+    let closed = model.effects().iter().filter_map(|effect| effect.place().closed_loops());
+    let loops: Vec<&InnerLoop> = closed.flat_map(ClosedLoops::loops).collect();
     if loops.is_empty() {
         return Ok((Sections::from_delayed_state_space(model.linear())?, effects));
     }
@@ -33,7 +33,8 @@ pub(crate) fn sections_of(model: &Model) -> Result<(Sections, Vec<Effect>), Erro
     let (sections, e, s) = Sections::with_loops(&around, delay, (inputs, outputs))?;
     let mut number = 0;
     for effect in &mut effects {
-        for inner in effect.block_mut().loops_mut() {
+        let PlaceMut::Loops(closed) = effect.place_mut() else { continue };
+        for inner in closed.loops_mut() {
             inner.drives = e.column(number).iter().copied().collect();
             if let Sees::Mixture { states, .. } = &mut inner.sees {
                 *states = s.row(number).iter().copied().collect();

@@ -2,7 +2,7 @@
 
 use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{Past, Point};
-use crate::effects::{Block, Effect, Sees};
+use crate::effects::{PlaceMut, Sees};
 use crate::fit::Grid;
 use crate::fit::hysteresis::forgets_at;
 use crate::fit::model_sections::sections_of;
@@ -198,10 +198,12 @@ pub(crate) fn rescale(point: &mut Point) {
     for (channel, gain) in point.channels.iter_mut().zip(&gains) {
         channel.weights.iter_mut().for_each(|weight| *weight *= gain);
     }
-    let blocks = point.effects.iter_mut().map(Effect::block_mut);
-    for inner in blocks.flat_map(Block::loops_mut) {
-        if let Sees::Mixture { inputs, .. } = &mut inner.sees {
-            inputs.iter_mut().zip(&gains).for_each(|(seen, gain)| *seen /= gain);
+    for effect in &mut point.effects {
+        let PlaceMut::Loops(closed) = effect.place_mut() else { continue };
+        for inner in closed.loops_mut() {
+            if let Sees::Mixture { inputs, .. } = &mut inner.sees {
+                inputs.iter_mut().zip(&gains).for_each(|(seen, gain)| *seen /= gain);
+            }
         }
     }
 }

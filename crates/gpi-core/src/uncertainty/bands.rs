@@ -58,9 +58,7 @@ impl Bands {
     pub(crate) fn effect_deviations(&self) -> Result<Vec<Vec<f64>>, Error> {
         let units = Units { input: "", output: "" };
         let quantities = |point: &Point| -> Vec<Vec<f64>> {
-            let of = |effect: &Effect| {
-                effect.block().quantities(units).iter().map(|q| q.value).collect()
-            };
+            let of = |effect: &Effect| effect.quantities(units).iter().map(|q| q.value).collect();
             point.blocks().iter().map(of).collect()
         };
         let sizes: Vec<usize> = quantities(&self.point).iter().map(Vec::len).collect();

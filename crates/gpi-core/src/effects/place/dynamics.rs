@@ -1,0 +1,36 @@
+//! The linear dynamics G: sections in parallel with them, and loops around them.
+
+use crate::effects::block::Block;
+use crate::effects::inner_loop::InnerLoop;
+
+/// The coefficients `a1, ..` and `b1, ..` of `(b1 q^-1 + ..) / (1 + a1 q^-1 + ..)`.
+pub type Coefficients = (Vec<f64>, Vec<f64>);
+
+/// Linear sections from v to the displacement, in parallel with G. The model has one output.
+pub trait ParallelSections: Block {
+    /// The input channel whose v drives the sections.
+    fn input(&self) -> usize;
+
+    /// The dead time in samples after which v reaches the sections.
+    fn dead_time(&self) -> usize;
+
+    /// The sections at a sampling rate in Hz. The values of the block follow from them.
+    fn sections(&self, rate: f64) -> Vec<Coefficients>;
+
+    /// Takes estimated sections, and the dead time of G in samples, which they share.
+    fn set_sections(&mut self, sections: &[Coefficients], dead_time: usize, rate: f64);
+
+    /// Smallest and largest a1 of the first-order sections.
+    fn section_bounds(&self, _rate: f64) -> (f64, f64) {
+        (f64::NEG_INFINITY, f64::INFINITY)
+    }
+}
+
+/// Loops that are closed around G. Their values are those of the block, in the order of the loops.
+pub trait ClosedLoops: Block {
+    /// The loops.
+    fn loops(&self) -> &[InnerLoop];
+
+    /// The same, to be changed.
+    fn loops_mut(&mut self) -> &mut [InnerLoop];
+}

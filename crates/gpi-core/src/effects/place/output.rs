@@ -1,0 +1,57 @@
+//! Behind G: the output stage, and the signals that are added before and after it.
+
+use crate::effects::block::Block;
+
+/// The time of one sample, and the other columns that were measured then.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'a> {
+    /// Seconds since the first sample.
+    pub time: f64,
+    /// Sampling rate in Hz.
+    pub rate: f64,
+    /// The other measured columns.
+    pub covariates: &'a [f64],
+}
+
+/// How a change of the displacement passes to the reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Slope {
+    /// It is multiplied by this factor.
+    Times(f64),
+    /// It does not pass: the reading keeps the changes of the sample before.
+    Held,
+}
+
+/// An effect between the displacement and the reading.
+pub trait OutputStage: Block {
+    /// The output channel.
+    fn output(&self) -> usize;
+
+    /// The state after the displacement has been constant at `first`.
+    fn rest(&self, _first: f64) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// The reading for one sample of the displacement, and how changes pass.
+    fn sense(&self, state: &mut [f64], displacement: f64, moment: Moment) -> (f64, Slope);
+}
+
+/// A signal that does not depend on the input.
+pub trait Added: Block {
+    /// The output channel.
+    fn output(&self) -> usize;
+
+    /// Whether it is a disturbance at the plant's output, before the sensor, and not only in the reading.
+    fn moves_stage(&self) -> bool;
+
+    /// Puts it before the output stage (true) or after it.
+    fn set_moves_stage(&mut self, moves_stage: bool);
+
+    /// The state before the first sample.
+    fn rest(&self, _first: Moment) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// The signal at one sample.
+    fn add(&self, state: &mut [f64], moment: Moment) -> f64;
+}

@@ -1,0 +1,30 @@
+//! The plays: their half-widths, and the curves through which they are read.
+
+use crate::effects::block::Block;
+
+/// An effect by which the half-widths of the plays depend on the speed of the drive.
+pub trait PlayWidths: Block {
+    /// The input channel whose hysteresis it changes.
+    fn input(&self) -> usize;
+
+    /// The state after a constant input.
+    fn rest(&self) -> Vec<f64>;
+
+    /// The quantity that half-widths grow with, at a speed `|du/dt|`; `rate` is the sampling rate in Hz.
+    fn speed_seen(&self, state: &mut [f64], speed: f64, rate: f64) -> f64;
+
+    /// The half-width of a play at that [`PlayWidths::speed_seen`], and its derivative by `half_width`.
+    fn width(&self, half_width: f64, speed_seen: f64) -> (f64, f64);
+}
+
+/// An effect that reads the plays through curves: a play F contributes `curve(F)` instead of F.
+pub trait PlayCurves: Block {
+    /// The input channel whose hysteresis it changes.
+    fn input(&self) -> usize;
+
+    /// The curve of a play at the value `place` of F, and its derivative by F.
+    fn read(&self, half_width: f64, place: f64) -> (f64, f64);
+
+    /// Adds `weight` times the derivatives of [`PlayCurves::read`] by the values to `slopes`.
+    fn read_slopes(&self, half_width: f64, place: f64, weight: f64, slopes: &mut [f64]);
+}
