@@ -1,8 +1,8 @@
 //! Another measured column that leaks in.
 //!
 //! `y += g L x`, (E13) in the documentation's theory: a measured column x (a temperature, a neighbouring
-//! axis) is added, either directly or through a first-order lag L of unit gain and time constant T, `x_L(k) =
-//! z x_L(k-1) + (1 - z) x(k)`, `z = exp(-Ts / T)`.
+//! axis) is added, either directly or through a first-order lag L of unit gain and time constant T,
+//! `x_L(k) = z x_L(k-1) + (1 - z) x(k)`, `z = exp(-Ts / T)`.
 //!
 //! A column that only repeats an input is not proposed.
 

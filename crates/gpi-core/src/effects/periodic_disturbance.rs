@@ -1,7 +1,7 @@
 //! A line in the spectrum that the input does not drive, such as mains hum, a pump or a vibration.
 //!
-//! `y += a cos(2 pi f t) + b sin(2 pi f t)`, (E12) in the documentation's theory. An amplitude `A cos(2 pi f
-//! t + phi)` has `a = A cos phi` and `b = -A sin phi`.
+//! `y += a cos(2 pi f t) + b sin(2 pi f t)`, (E12) in the documentation's theory. The sinusoid
+//! `A cos(2 pi f t + phi)` has `a = A cos phi` and `b = -A sin phi`.
 
 use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
 use crate::spectrum::{Strongest, near, peak, power};
