@@ -1,5 +1,6 @@
 //! The amplifier's largest slope.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
 
 /// `u_s(k) = u_s(k-1) + clamp(u(k) - u_s(k-1), -s Ts, s Ts)`: the drive cannot change faster than s.
@@ -19,6 +20,11 @@ impl AmplifierSlew {
     pub(super) const STAGE: Stage = Stage::Input;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["speed"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// Limits that so many of the record's steps stay below: an amplifier that is slower than most of
     /// them would be seen at once.

@@ -1,5 +1,6 @@
 //! Mechanical play after G.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units};
 use crate::operators::play;
 
@@ -20,6 +21,11 @@ impl Backlash {
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["direction"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// Half-widths from a ten-thousandth of the span to a fifth.
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {

@@ -1,5 +1,6 @@
 //! Noise with memory.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
 /// `e(k) = sum_i a_i e(k-i) + w(k)`, w white: what is left remembers itself, and nothing else.
@@ -23,6 +24,11 @@ impl ColouredNoise {
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["whiteness"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = true;
 
     /// None: it is what remains when nothing else explains the residual.
     pub(super) fn candidates(_: &Situation) -> Vec<Candidate> {

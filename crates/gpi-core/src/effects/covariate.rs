@@ -1,5 +1,6 @@
 //! Another measured column that leaks in.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
 use crate::Record;
 
@@ -33,6 +34,11 @@ impl Covariate {
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::Unique;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &[];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let shortest = 1.0 / situation.record.rate();

@@ -1,5 +1,6 @@
 //! Slow relaxation driven by v.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
 /// `y += sum_i c_i L_i v` with first-order lags L_i of unit gain and time constants T_i: after a step the
@@ -39,6 +40,12 @@ impl Creep {
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::HidesInSlowPoles;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Rests;
+    pub(super) const SHOWN_BY: &'static [&'static str] =
+        &["past-input", "past-intermediate", "trend"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// One, two and three lags between somewhat more than the shortest and the record's length.
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {

@@ -1,5 +1,6 @@
 //! Dead time beyond the linear model's.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
 
 /// `u_d(t) = u(t - T)`: the drive arrives T later; between samples u is a straight line.
@@ -22,6 +23,11 @@ impl Delay {
     pub(super) const STAGE: Stage = Stage::Input;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Contained;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["past-input"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let delays =

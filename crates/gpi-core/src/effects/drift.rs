@@ -1,5 +1,6 @@
 //! Slow change that the input does not drive.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units, knots};
 
 /// `y += d(t)`, d a slow function of time: a smooth curve through evenly spaced knots, the first of which
@@ -27,6 +28,11 @@ impl Drift {
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::SlowInTime;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Rests;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["mean", "trend"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let duration = situation.duration();

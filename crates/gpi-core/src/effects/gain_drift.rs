@@ -1,5 +1,6 @@
 //! Sensitivity that changes slowly.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Moment, Quantity, Situation, Slope, Stage, Units, knots};
 
 /// `y = x (1 + g(t))`, g a slow function of time: a smooth curve through evenly spaced knots, the first
@@ -22,6 +23,11 @@ impl GainDrift {
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::SlowInTime;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Rests;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["trend"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         let duration = situation.duration();

@@ -1,5 +1,6 @@
 //! A mode that the linear part lacks.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
 /// `(b1 q^-1 + b2 q^-2) / (1 + a1 q^-1 + a2 q^-2)` from v to y, beside G: one more mode, or two real
@@ -26,6 +27,11 @@ impl LinearDynamics {
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::ShapeOfCycle;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::JoinsG;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["past-input", "past-intermediate"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// Lightly damped modes from a few periods a record to close to half the rate.
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {

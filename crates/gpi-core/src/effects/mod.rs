@@ -21,6 +21,7 @@ mod loop_signals;
 mod outliers;
 mod output_nonlinearity;
 mod periodic_disturbance;
+mod properties;
 mod rate_dependence;
 mod situation;
 mod stiffness;
@@ -40,6 +41,7 @@ pub use linear_dynamics::LinearDynamics;
 pub use outliers::Outliers;
 pub use output_nonlinearity::OutputNonlinearity;
 pub use periodic_disturbance::PeriodicDisturbance;
+pub use properties::{FreeOrder, SeparatedBy, Signature};
 pub use rate_dependence::{RateDependence, SpeedLaw};
 pub use stiffness::Stiffness;
 
@@ -65,6 +67,11 @@ macro_rules! catalogue {
             pub(crate) fn block_mut(&mut self) -> &mut dyn Block {
                 match self { $(Self::$effect(block) => block),* }
             }
+
+            /// Its entry in the catalogue.
+            pub fn entry(&self) -> &'static Entry {
+                match self { $(Self::$effect(_) => const { &catalogue!(@entry $effect) }),* }
+            }
         }
 
         $(impl From<$effect> for Effect {
@@ -74,14 +81,22 @@ macro_rules! catalogue {
         })*
 
         /// All effects, in the order of the chain.
-        pub const CATALOGUE: &[Entry] = &[$(Entry {
+        pub const CATALOGUE: &[Entry] = &[$(catalogue!(@entry $effect)),*];
+    };
+    (@entry $effect:ident) => {
+        Entry {
             name: $effect::NAME,
             what: $effect::WHAT,
             stage: $effect::STAGE,
             driven: $effect::DRIVEN,
             repeats: $effect::REPEATS,
+            signature: $effect::SIGNATURE,
+            free_order: $effect::FREE_ORDER,
+            separated_by: $effect::SEPARATED_BY,
+            shown_by: $effect::SHOWN_BY,
+            explains_autocorrelation: $effect::EXPLAINS_AUTOCORRELATION,
             candidates: $effect::candidates,
-        }),*];
+        }
     };
 }
 
@@ -117,6 +132,16 @@ pub struct Entry {
     pub driven: bool,
     /// Whether a model may have it more than once: two lines, two columns, a finer function of time.
     pub repeats: bool,
+    /// How surely a residual tells it from a bad fit.
+    pub signature: Signature,
+    /// How it relates to linear dynamics of free order.
+    pub free_order: FreeOrder,
+    /// Which experiment separates it from the effects that look like it.
+    pub separated_by: SeparatedBy,
+    /// Names of the residual tests that point to it.
+    pub shown_by: &'static [&'static str],
+    /// Whether a residual's autocorrelation is explained once it is found.
+    pub explains_autocorrelation: bool,
     /// The blocks that the search tries before a base model.
     pub(crate) candidates: fn(&Situation) -> Vec<Candidate>,
 }
@@ -128,13 +153,6 @@ impl std::fmt::Debug for Entry {
 }
 
 impl Effect {
-    /// Its entry in the catalogue.
-    pub fn entry(&self) -> &'static Entry {
-        let name = self.block().name();
-        // every variant comes from the catalogue
-        CATALOGUE.iter().find(|entry| entry.name == name).unwrap_or(&CATALOGUE[0])
-    }
-
     /// Its name, such as `creep`.
     pub fn name(&self) -> &'static str {
         self.block().name()

@@ -1,5 +1,6 @@
 //! Isolated wrong samples.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Quantity, Situation, Stage, Units};
 
 /// Samples that stand apart from their neighbours by far more than the noise; the fit counts them by
@@ -22,6 +23,11 @@ impl Outliers {
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["outliers"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// None: they are counted in the residual.
     pub(super) fn candidates(_: &Situation) -> Vec<Candidate> {

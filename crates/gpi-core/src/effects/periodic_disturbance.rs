@@ -1,5 +1,6 @@
 //! A line that the input does not drive.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Effect, Moment, Quantity, Situation, Stage, Units};
 use crate::spectrum::{Strongest, near, peak, power};
 
@@ -32,6 +33,11 @@ impl PeriodicDisturbance {
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::Unique;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["lines"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// The line of the residual's spectrum that stands out most from its neighbours.
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {

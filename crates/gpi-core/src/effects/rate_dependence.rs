@@ -1,5 +1,6 @@
 //! Half-widths that grow with speed.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, Moment, Quantity, Situation, Stage, Units};
 
 /// `r(k) = r (1 + a g(s)) + b g(s)` for every play of half-width r > 0, s the speed |du/dt|: loops open
@@ -55,6 +56,11 @@ impl RateDependence {
     pub(super) const STAGE: Stage = Stage::Plays;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::ShapeOfCycle;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["speed"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         /// Exponents, and knees over the median speed.

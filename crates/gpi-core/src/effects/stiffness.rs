@@ -1,6 +1,7 @@
 //! A resonance that moves with amplitude.
 
 use super::loop_signals::{LoopSignal, Shape, families};
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Candidate, InnerLoop, Law, Quantity, Sees, Situation, Stage, Units};
 
 /// Loops around G: a restoring force that is not in proportion to the displacement acts inside the
@@ -24,6 +25,11 @@ impl Stiffness {
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::ShapeOfCycle;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["amplitude", "level-to-level"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn candidates(situation: &Situation) -> Vec<Candidate> {
         // A lag has no resonance to move.
