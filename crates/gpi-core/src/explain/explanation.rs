@@ -94,12 +94,11 @@ pub(super) fn summarise(
     record: &Record,
     holdout: Option<&Record>,
     base: &Point,
-    setup: &SearchSetup,
     state: SearchState,
     refinement: Refinement,
     interrupted: bool,
 ) -> Result<Explanation, Error> {
-    let (mended, measured) = (&state.prepared.record, &setup.measured);
+    let (mended, measured) = (&state.prepared.record, &state.setup.measured);
     let means = &state.prepared.means;
     let (residuals_before, residuals_after) =
         (base.residuals(measured)?, state.point.residuals(mended)?);
@@ -109,7 +108,7 @@ pub(super) fn summarise(
         let train = SimulationError::of(record, residuals, false);
         let test = match holdout {
             Some(other) => on_another(model, other)?,
-            None => SimulationError::of(&setup.test, residuals, false),
+            None => SimulationError::of(&state.setup.test, residuals, false),
         };
         Ok(Errors { train, holdout: test })
     };
@@ -117,13 +116,13 @@ pub(super) fn summarise(
     let after = errors(mended, &model, &residuals_after)?;
     let tests = residual::tests_of(&model, mended, &residuals_after)?;
     let noise: Vec<Effect> =
-        noise::effects(setup, &state, &residuals_after, &tests, &refinement.noise_floor)?
+        noise::effects(&state, &residuals_after, &tests, &refinement.noise_floor)?
             .into_iter()
-            .filter(|effect| setup.allowed.iter().any(|entry| entry.name == effect.name()))
+            .filter(|effect| state.setup.allowed.iter().any(|entry| entry.name == effect.name()))
             .collect();
     let values = state.prepared.values();
     let mut steps = vec![declared(&before)];
-    steps.extend(state.additions.iter().map(|one| added(one, setup, values)));
+    steps.extend(state.additions.iter().map(|one| added(one, state.setup, values)));
     steps.extend(noise.iter().map(|effect| of_noise(effect, &after)));
     describe(&mut steps, &state.point, &refinement, &noise, &model)?;
     let found = |one: &Addition| one.trial.point.to_model(record, mended, means);

@@ -36,25 +36,21 @@ impl Place {
 }
 
 /// Moves half-widths and thresholds, and takes finer grids as long as they pay. Says whether the model became better.
-pub(super) fn refine_grids(
-    setup: &SearchSetup,
-    state: &mut SearchState,
-    progress: Progress,
-) -> Result<bool, Error> {
-    let policy = &setup.policy.grid;
+pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    let policy = &state.setup.policy.grid;
     state.is_rich = true;
-    if !setup.moving.half_widths && !setup.moving.thresholds {
+    if !state.setup.moving.half_widths && !state.setup.moving.thresholds {
         return Ok(false);
     }
     let values = state.prepared.values();
     let mut gained = false;
     for round in 0..policy.rounds {
         report(progress, "finer grid", round as f64 / policy.rounds as f64)?;
-        let (point, added) = enriched(setup, state)?;
+        let (point, added) = enriched(state)?;
         if added == 0 && round > 0 {
             break;
         }
-        let (point, cost) = on_moving_grids(setup, state, point, progress)?;
+        let (point, cost) = on_moving_grids(state, point, progress)?;
         let deviance = values * (state.cost / cost.max(f64::MIN_POSITIVE)).ln();
         // a play has two numbers
         if deviance < 2.0 * added as f64 * values.ln() {
@@ -71,15 +67,15 @@ pub(super) fn refine_grids(
 
 /// A point fitted with grids that move, plays and deadzones without use left out; and its squares.
 fn on_moving_grids(
-    setup: &SearchSetup,
     state: &SearchState,
     point: Point,
     progress: Progress,
 ) -> Result<(Point, f64), Error> {
-    let policy = &setup.policy.grid;
-    let still = FitOptions { steps: policy.held_steps, gain: policy.gain, ..setup.options.clone() };
+    let policy = &state.setup.policy.grid;
+    let still =
+        FitOptions { steps: policy.held_steps, gain: policy.gain, ..state.setup.options.clone() };
     let point = state.fit(point, &still, "refinement", progress)?.point;
-    let mut options = FitOptions { steps: policy.moving_steps, ..setup.moving_grids.clone() };
+    let mut options = FitOptions { steps: policy.moving_steps, ..state.setup.moving_grids.clone() };
     let mut fitted = state.fit(point, &options, "refinement", progress)?;
     if fitted.point.drop_unused() {
         options.steps = policy.moving_steps / 3;
@@ -90,12 +86,13 @@ fn on_moving_grids(
 
 /// The point with those plays and deadzones more, without weight yet, that would take most of the residual; how many
 /// they are.
-fn enriched(setup: &SearchSetup, state: &SearchState) -> Result<(Point, usize), Error> {
-    let policy = &setup.policy.grid;
+fn enriched(state: &SearchState) -> Result<(Point, usize), Error> {
+    let policy = &state.setup.policy.grid;
     let SearchState { point, prepared, .. } = state;
     let record = &prepared.record;
-    let base = Base::new(point, record, setup.options.freedom, &setup.options.weighting)?;
-    let places = places(&base, &prepared.spans(point), setup);
+    let base =
+        Base::new(point, record, state.setup.options.freedom, &state.setup.options.weighting)?;
+    let places = places(&base, &prepared.spans(point), state.setup);
     let columns = |known: &Signals, here: &Matrix, experiment: &Experiment, index: usize| {
         let column = |place: &Place| {
             let point = place.added_to(base.point, policy.probe);

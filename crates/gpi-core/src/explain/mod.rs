@@ -115,19 +115,19 @@ pub fn explain(
     let weights = &refined.options.weighting.outputs;
     let setup =
         SearchSetup::new(&prepared, weights, measured, allowed, order_is_given, moving, policy)?;
-    let mut state = SearchState::new(prepared, &refined);
-    state.repair(&setup)?;
-    let mut interrupted = is_interrupted(search::run(&setup, &mut state, progress))?;
-    revision::settle_lags(&setup, &mut state)?;
+    let mut state = SearchState::new(&setup, prepared, &refined);
+    state.repair()?;
+    let mut interrupted = is_interrupted(search::run(&mut state, progress))?;
+    revision::settle_lags(&mut state)?;
     for entry in required {
         if !interrupted {
-            let forced = search::force(&setup, &mut state, entry, progress);
+            let forced = search::force(&mut state, entry, progress);
             interrupted = is_interrupted(forced)?;
         }
     }
     let mut patient = |_: &str, _: f64| true;
     let last: Progress = if interrupted { &mut patient } else { progress };
-    let refinement = finish(&setup, &mut state, interrupted, last)?;
+    let refinement = finish(&mut state, interrupted, last)?;
     // what rules out that the input's side alone is wrong
     let has_loops = state.point.loops().next().is_some();
     let moved_resonance = if has_loops && !interrupted {
@@ -136,7 +136,7 @@ pub fn explain(
     } else {
         None
     };
-    let found = summarise(record, holdout, &base, &setup, state, refinement, interrupted)?;
+    let found = summarise(record, holdout, &base, state, refinement, interrupted)?;
     Ok(Explanation { moved_resonance, ..found })
 }
 
@@ -184,11 +184,11 @@ fn as_measured(prepared: &Record, given: &Record, means: &[f64]) -> Result<Recor
 
 /// Refines everything once more, grids that were not given included, and estimates the parameters' uncertainty.
 fn finish(
-    setup: &SearchSetup,
     state: &mut SearchState,
     interrupted: bool,
     progress: Progress,
 ) -> Result<Refinement, Error> {
+    let setup = state.setup;
     let FitPolicy { last_free_steps, last_held_steps, coarser, .. } = setup.policy.fits;
     let stage = |options: &RefineOptions, steps: usize| {
         let mut own = settings(&state.prepared, options, steps);
@@ -207,7 +207,7 @@ fn finish(
         fitted = again.after(&settled.history);
     }
     state.point = fitted.point.clone();
-    state.repair(setup)?;
+    state.repair()?;
     let refined = Refined { fitted, options, outliers: 0, robust: false };
     let refinement = refined.finish(&state.prepared, progress)?;
     state.point = refinement.point.clone();

@@ -2,7 +2,6 @@
 
 use super::policy::NoisePolicy;
 use super::residual::{ResidualTest, STRUCTURE};
-use super::setup::SearchSetup;
 use super::state::SearchState;
 use crate::effects::{ColouredNoise, Effect, Outliers};
 use crate::identify::{NoiseFloor, NoiseMethod};
@@ -11,30 +10,29 @@ use crate::{Error, Matrix, Record};
 
 /// What the noise is besides white, once everything else is explained.
 pub(super) fn effects(
-    setup: &SearchSetup,
     state: &SearchState,
     residuals: &[Matrix],
     tests: &[ResidualTest],
     floor: &NoiseFloor,
 ) -> Result<Vec<Effect>, Error> {
     let mut found = Vec::new();
-    found.extend(outliers(setup, state, residuals));
-    for output in 0..setup.measured.outputs().len() {
+    found.extend(outliers(state, residuals));
+    for output in 0..state.setup.measured.outputs().len() {
         let fails = |test: &ResidualTest| {
             test.output == output && STRUCTURE.contains(&test.name) && !test.passed()
         };
         if !tests.iter().any(fails) {
-            found.extend(memory(setup, state, residuals, output, floor)?);
+            found.extend(memory(state, residuals, output, floor)?);
         }
     }
     Ok(found)
 }
 
 /// The samples that were found wrong, and by how much they were changed.
-fn outliers(setup: &SearchSetup, state: &SearchState, residuals: &[Matrix]) -> Option<Effect> {
-    let policy = &setup.policy.noise;
+fn outliers(state: &SearchState, residuals: &[Matrix]) -> Option<Effect> {
+    let policy = &state.setup.policy.noise;
     let (mut count, mut driven, mut squares) = (0, 0, 0.0);
-    let measured = &setup.measured;
+    let measured = &state.setup.measured;
     let pairs = measured.experiments().iter().zip(state.prepared.record.experiments());
     for ((given, mended), places) in pairs.zip(&state.wrong) {
         let after_jumps = after_jumps(&given.input, policy);
@@ -52,7 +50,7 @@ fn outliers(setup: &SearchSetup, state: &SearchState, residuals: &[Matrix]) -> O
     // where most follow a jump of the input, it is the model that errs at jumps
     let stand_apart = count >= policy.fewest
         && (driven as f64) < policy.after_jumps * count as f64
-        && squares > setup.policy.judgement.least * (left + squares);
+        && squares > state.setup.policy.judgement.least * (left + squares);
     stand_apart.then(|| Outliers { count, samples, size }.into())
 }
 
@@ -76,20 +74,19 @@ fn after_jumps(input: &Matrix, policy: &NoisePolicy) -> Vec<bool> {
 /// Autocorrelated noise, if the residual's past predicts it on the training data and on what is held out, and if the
 /// noise is also there when nothing moves, as far as the record shows that.
 fn memory(
-    setup: &SearchSetup,
     state: &SearchState,
     residuals: &[Matrix],
     output: usize,
     floor: &NoiseFloor,
 ) -> Result<Option<Effect>, Error> {
-    let policy = &setup.policy.noise;
+    let policy = &state.setup.policy.noise;
     let colour = Colour::of(residuals, &state.prepared.record);
     let filter = &colour.coefficients[output];
     if filter.is_empty() {
         return Ok(None);
     }
     let (own, innovation) = one_step(residuals, &state.prepared.record, output, filter);
-    let (held_out, predicted) = one_step(residuals, &setup.test, output, filter);
+    let (held_out, predicted) = one_step(residuals, &state.setup.test, output, filter);
     let outputs = state.prepared.record.experiments().iter().map(|e| e.output.column(output));
     let span = outputs.map(|column| column.max() - column.min()).fold(0.0, f64::max);
     let loudest = match floor.method {

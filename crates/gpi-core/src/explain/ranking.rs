@@ -3,7 +3,6 @@
 use super::base::Base;
 use super::policy::RankingPolicy;
 use super::score::{Score, scores};
-use super::setup::SearchSetup;
 use super::state::SearchState;
 use crate::Error;
 use crate::chain::point::Point;
@@ -22,36 +21,31 @@ pub(super) struct Ranked {
 }
 
 /// The best candidate of each effect that promises something, the most promising first.
-pub(super) fn ranked(
-    setup: &SearchSetup,
-    state: &SearchState,
-    progress: Progress,
-) -> Result<Vec<Ranked>, Error> {
-    let mut best = scored_beside(setup, state, &state.point, &setup.allowed, progress)?;
+pub(super) fn ranked(state: &SearchState, progress: Progress) -> Result<Vec<Ranked>, Error> {
+    let mut best = scored_beside(state, &state.point, &state.setup.allowed, progress)?;
     let most = best.first().map_or(0.0, |first| first.worth);
-    let far_behind = setup.policy.ranking.far_behind;
+    let far_behind = state.setup.policy.ranking.far_behind;
     best.retain(|one| one.worth > 0.0 && one.worth > far_behind * most);
     Ok(best)
 }
 
 /// The best candidate of each effect when it is added to a point, the most promising first.
 pub(super) fn scored_beside(
-    setup: &SearchSetup,
     state: &SearchState,
     point: &Point,
     effects: &[&'static Entry],
     progress: Progress,
 ) -> Result<Vec<Ranked>, Error> {
-    let (record, options) = (&state.prepared.record, &setup.options);
-    let few = representatives(point, record, setup.unknowns(point));
+    let (record, options) = (&state.prepared.record, &state.setup.options);
+    let few = representatives(point, record, state.setup.unknowns(point));
     let alone = few.map(|few| few.alone(point, record)).transpose()?;
     let (point, record) = alone.as_ref().map_or((point, record), |(p, r)| (p, r));
     let base = Base::new(point, record, options.freedom, &options.weighting)?;
     let values = (record.scored() * record.outputs().len()) as f64;
     let is_present = |entry: &Entry| point.effects.iter().any(|e| e.name() == entry.name);
     let usable = |entry: &&&Entry| {
-        (entry.free_order != FreeOrder::Contained || setup.order_is_given)
-            && (entry.signature != Signature::ShapeOfCycle || !setup.is_one_sine)
+        (entry.free_order != FreeOrder::Contained || state.setup.order_is_given)
+            && (entry.signature != Signature::ShapeOfCycle || !state.setup.is_one_sine)
             && (entry.repeats || !is_present(entry))
     };
     let (mut entries, mut candidates) = (Vec::new(), Vec::new());
@@ -66,7 +60,7 @@ pub(super) fn scored_beside(
     let mut check = |done| report(progress, "score test", done);
     let mut best = Vec::new();
     let scores = scores(&base, &candidates, &mut check)?;
-    let policy = &setup.policy.ranking;
+    let policy = &state.setup.policy.ranking;
     let is_slow: Vec<bool> = (0..scores.len()).map(|i| is_slow(&scores, i, policy)).collect();
     for ((entry, score), is_slow) in entries.into_iter().zip(scores).zip(is_slow) {
         if entry.signature == Signature::SlowInTime && !is_slow {

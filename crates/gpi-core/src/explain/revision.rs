@@ -2,7 +2,6 @@
 
 use super::judgement::is_superfluous;
 use super::ranking::{Ranked, scored_beside};
-use super::setup::SearchSetup;
 use super::state::{Addition, BeforeLags, SearchState, Trial};
 use super::trial::{fitted, measured, start};
 use crate::Error;
@@ -14,19 +13,15 @@ use crate::fit::minimize::{FitOptions, Fitted};
 use crate::fit::preparation::rescale;
 
 /// Puts what is added to the other side of the output stage where that explains more.
-pub(super) fn rearrange(
-    setup: &SearchSetup,
-    state: &mut SearchState,
-    progress: Progress,
-) -> Result<(), Error> {
+pub(super) fn rearrange(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
     if !state.point.senses() {
         return Ok(());
     }
     for place in 0..state.point.effects.len() {
         let Some(other) = state.point.effects[place].block().elsewhere() else { continue };
         let moved = state.point.without_effect(place).with_effect(other);
-        let fitted = state.fit(moved, &setup.options, "rearrangement", progress)?;
-        if fitted.linearization.cost < (1.0 - setup.policy.revision.other_side) * state.cost {
+        let fitted = state.fit(moved, &state.setup.options, "rearrangement", progress)?;
+        if fitted.linearization.cost < (1.0 - state.setup.policy.revision.other_side) * state.cost {
             (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
         }
     }
@@ -34,11 +29,7 @@ pub(super) fn rearrange(
 }
 
 /// Drops effects that a later one has made superfluous.
-pub(super) fn drop_superfluous(
-    setup: &SearchSetup,
-    state: &mut SearchState,
-    progress: Progress,
-) -> Result<(), Error> {
+pub(super) fn drop_superfluous(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
     let Some(newest) = state.additions.last().map(|addition| addition.trial.clone()) else {
         return Ok(());
     };
@@ -49,11 +40,11 @@ pub(super) fn drop_superfluous(
             place += 1;
             continue;
         }
-        let fitted = without(setup, state, place, newest.entry, progress)?;
+        let fitted = without(state, place, newest.entry, progress)?;
         let lost = state.prepared.values() * (fitted.linearization.cost / state.cost).ln();
-        let now = state.held_out(setup, &state.point)?;
-        let then = state.held_out(setup, &fitted.point)?;
-        let factor = setup.policy.revision.superfluous;
+        let now = state.held_out(&state.point)?;
+        let then = state.held_out(&fitted.point)?;
+        let factor = state.setup.policy.revision.superfluous;
         if is_superfluous(lost, newest.threshold, [&now, &then], factor) {
             (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
             if let Some(addition) = state.additions.last_mut() {
@@ -69,44 +60,40 @@ pub(super) fn drop_superfluous(
 /// The best fit without one of the effects. The newest starts from the score test anew too: beside the one that goes
 /// it may have become what no fit leads back from.
 fn without(
-    setup: &SearchSetup,
     state: &SearchState,
     place: usize,
     newest: &'static Entry,
     progress: Progress,
 ) -> Result<Fitted, Error> {
     let without = state.point.without_effect(place);
-    let (refitted, _) = fitted(setup, state, without.clone(), newest, progress)?;
+    let (refitted, _) = fitted(state, without.clone(), newest, progress)?;
     let own = without.effects.iter().rposition(|effect| effect.name() == newest.name);
     let Some(own) = own.filter(|_| newest.driven) else { return Ok(refitted) };
     let point = without.without_effect(own);
-    let best = scored_beside(setup, state, &point, &[newest], progress)?.into_iter().next();
+    let best = scored_beside(state, &point, &[newest], progress)?.into_iter().next();
     let Some(best) = best else { return Ok(refitted) };
-    let start = start(setup, state, &point, best.score)?;
-    let (anew, _) = fitted(setup, state, start, newest, progress)?;
+    let start = start(state, &point, best.score)?;
+    let (anew, _) = fitted(state, start, newest, progress)?;
     let is_better = anew.linearization.cost < refitted.linearization.cost;
     Ok(if is_better { anew } else { refitted })
 }
 
 /// Puts what the input drives in the place of a slow function of time, which fits much, where it explains as much.
-pub(super) fn prefer_driven(
-    setup: &SearchSetup,
-    state: &mut SearchState,
-    progress: Progress,
-) -> Result<(), Error> {
+pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
     let is_slow = |entry: &Entry| entry.signature == Signature::SlowInTime;
     let driven: Vec<&'static Entry> =
-        setup.allowed.iter().copied().filter(|own| own.driven && !is_slow(own)).collect();
+        state.setup.allowed.iter().copied().filter(|own| own.driven && !is_slow(own)).collect();
     // from the end of the chain
     for slow in CATALOGUE.iter().rev().filter(|entry| is_slow(entry)) {
         let place = state.point.effects.iter().position(|effect| effect.name() == slow.name);
         let Some(place) = place else { continue };
         let without = state.point.without_effect(place);
-        let best = scored_beside(setup, state, &without, &driven, progress)?.into_iter().next();
+        let best = scored_beside(state, &without, &driven, progress)?.into_iter().next();
         let Some(Ranked { entry, score, .. }) = best else { continue };
-        let options = FitOptions { steps: 2 * setup.options.steps, ..setup.options.clone() };
+        let options =
+            FitOptions { steps: 2 * state.setup.options.steps, ..state.setup.options.clone() };
         let gain = score.gain;
-        let start = start(setup, state, &without, score)?;
+        let start = start(state, &without, score)?;
         let fitted = state.fit(start, &options, entry.name, progress)?;
         let lost = state.prepared.values() * (fitted.linearization.cost / state.cost).ln();
         let named = state.additions.iter().find(|addition| addition.trial.entry.name == slow.name);
@@ -115,19 +102,19 @@ pub(super) fn prefer_driven(
         else {
             continue;
         };
-        let options = setup.options.clone();
-        let trial = measured(setup, state, &without, entry, fitted, options, gain, progress)?;
+        let options = state.setup.options.clone();
+        let trial = measured(state, &without, entry, fitted, options, gain, progress)?;
         // what the slow function had gained, less what is lost with it
         let trial = Trial { deviance: deviance - lost, ..trial };
-        let held_out = state.held_out(setup, &state.point)?;
-        let factor = setup.policy.revision.driven_instead;
+        let held_out = state.held_out(&state.point)?;
+        let factor = state.setup.policy.revision.driven_instead;
         if trial.is_driven
             && state.is_plausible(&trial.point)
             && is_superfluous(lost, threshold, [&held_out, &trial.held_out], factor)
         {
             let dropped = vec![slow.name];
             state.point = trial.point.clone();
-            state.add(setup, Addition { trial, others: Vec::new(), dropped })?;
+            state.add(Addition { trial, others: Vec::new(), dropped })?;
         }
     }
     Ok(())
@@ -151,21 +138,17 @@ pub(super) fn join_modes(point: &mut Point) {
 
 /// Takes slow poles out of G that came when something else was fitted, so that the next round can name the effect that
 /// hides in them; says whether there were any.
-pub(super) fn shed_lags(
-    setup: &SearchSetup,
-    state: &mut SearchState,
-    progress: Progress,
-) -> Result<bool, Error> {
+pub(super) fn shed_lags(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let hides = |entry: &&Entry| entry.free_order == FreeOrder::HidesInSlowPoles;
-    let may_hide = setup.allowed.iter().copied().filter(hides).any(|entry| !state.has(entry));
-    if !may_hide || setup.order_is_given || state.before_lags.is_some() {
+    let may_hide = state.setup.allowed.iter().copied().filter(hides).any(|entry| !state.has(entry));
+    if !may_hide || state.setup.order_is_given || state.before_lags.is_some() {
         return Ok(false);
     }
     let memory = Memory::of(&state.prepared.record);
     let Some(point) = state.point.without(|pole| memory.is_slow_lag(pole))? else {
         return Ok(false);
     };
-    let fitted = state.fit(point, &setup.options, "slow poles", progress)?;
+    let fitted = state.fit(point, &state.setup.options, "slow poles", progress)?;
     let before = std::mem::replace(&mut state.point, fitted.point);
     let additions = state.additions.len();
     state.before_lags = Some(BeforeLags { point: before, cost: state.cost, additions });
@@ -175,13 +158,13 @@ pub(super) fn shed_lags(
 }
 
 /// Goes back to what was before slow poles were taken out, where no effect explains as much as they did.
-pub(super) fn settle_lags(setup: &SearchSetup, state: &mut SearchState) -> Result<(), Error> {
+pub(super) fn settle_lags(state: &mut SearchState) -> Result<(), Error> {
     let Some(before) = state.before_lags.take() else { return Ok(()) };
-    let most = setup.policy.revision.instead_of_lags * before.cost;
+    let most = state.setup.policy.revision.instead_of_lags * before.cost;
     if state.additions.len() == before.additions || state.cost > most {
         state.additions.truncate(before.additions);
         state.point = before.point;
-        state.repair(setup)?;
+        state.repair()?;
     }
     Ok(())
 }

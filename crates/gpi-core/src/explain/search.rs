@@ -12,46 +12,42 @@ use crate::effects::{Entry, FreeOrder, Signature};
 use crate::progress::Progress;
 
 /// Adds effects until nothing more is confirmed.
-pub(super) fn run(
-    setup: &SearchSetup,
-    state: &mut SearchState,
-    progress: Progress,
-) -> Result<(), Error> {
-    for _ in 0..setup.policy.revision.rounds {
-        if !round(setup, state, progress)? && !shed_lags(setup, state, progress)? {
+pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+    for _ in 0..state.setup.policy.revision.rounds {
+        if !round(state, progress)? && !shed_lags(state, progress)? {
             break;
         }
     }
-    prefer_driven(setup, state, progress)
+    prefer_driven(state, progress)
 }
 
 /// One round: takes the best effect, if any is confirmed; says whether the model became another.
-fn round(setup: &SearchSetup, state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
-    let policy = &setup.policy.ranking;
-    let mut best = ranked(setup, state, progress)?;
+fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    let policy = &state.setup.policy.ranking;
+    let mut best = ranked(state, progress)?;
     // A strong candidate is looked at first: the grid would bend to what it explains.
     let most = best.iter().map(|one| one.score.gain).fold(0.0, f64::max);
-    if most < policy.strong && !state.is_rich && refine_grids(setup, state, progress)? {
-        best = ranked(setup, state, progress)?;
+    if most < policy.strong && !state.is_rich && refine_grids(state, progress)? {
+        best = ranked(state, progress)?;
     }
-    let hopeless = policy.hopeless * setup.policy.judgement.least;
+    let hopeless = policy.hopeless * state.setup.policy.judgement.least;
     if best.iter().all(|one| one.score.gain < hopeless) {
         state.last.clear();
         return Ok(false);
     }
     best.truncate(policy.fitted);
-    let mut trials = trials(setup, state, best, progress)?;
+    let mut trials = trials(state, best, progress)?;
     // what is explained, less what so many parameters would explain of noise
     trials.sort_by(|a, b| (b.deviance - b.threshold).total_cmp(&(a.deviance - a.threshold)));
-    let before = state.held_out(setup, &state.point)?;
-    let noise = state.noise_squares(setup)?;
+    let before = state.held_out(&state.point)?;
+    let noise = state.noise_squares()?;
     let evidence = |trial| evidence(state, trial, noise, &before);
     let evidences: Vec<Evidence> = trials.iter().map(evidence).collect();
-    let judgement = &setup.policy.judgement;
+    let judgement = &state.setup.policy.judgement;
     let taken = choose(&evidences, judgement);
     let reject = |place: usize| {
         let refusal = refusal(&evidences[place], taken.map(|taken| &evidences[taken]), judgement);
-        rejected(setup, &trials[place], refusal, taken.map(|taken| &trials[taken]))
+        rejected(state.setup, &trials[place], refusal, taken.map(|taken| &trials[taken]))
     };
     let others = (0..trials.len()).filter(|&place| Some(place) != taken).map(reject).collect();
     let Some(taken) = taken else {
@@ -60,14 +56,14 @@ fn round(setup: &SearchSetup, state: &mut SearchState, progress: Progress) -> Re
     };
     let trial = trials.swap_remove(taken);
     state.point = trial.point.clone();
-    if trial.entry.free_order == FreeOrder::JoinsG && !setup.order_is_given {
+    if trial.entry.free_order == FreeOrder::JoinsG && !state.setup.order_is_given {
         join_modes(&mut state.point);
     }
-    state.add(setup, Addition { trial, others, dropped: Vec::new() })?;
+    state.add(Addition { trial, others, dropped: Vec::new() })?;
     // the grids were placed before this effect was known
     state.is_rich = false;
-    rearrange(setup, state, progress)?;
-    drop_superfluous(setup, state, progress)?;
+    rearrange(state, progress)?;
+    drop_superfluous(state, progress)?;
     Ok(true)
 }
 
@@ -104,7 +100,6 @@ fn rejected(setup: &SearchSetup, trial: &Trial, why: Refusal, taken: Option<&Tri
 
 /// Adds an effect that the user asks for, whatever it gains.
 pub(super) fn force(
-    setup: &SearchSetup,
     state: &mut SearchState,
     entry: &'static Entry,
     progress: Progress,
@@ -112,12 +107,12 @@ pub(super) fn force(
     if state.has(entry) {
         return Ok(());
     }
-    let best = scored_beside(setup, state, &state.point, &[entry], progress)?.into_iter().next();
+    let best = scored_beside(state, &state.point, &[entry], progress)?.into_iter().next();
     let Some(best) = best else {
         let requirement = "the record shows nothing to place it by; leave it out";
         return Err(Error::parameter("require", entry.name, requirement));
     };
-    let trial = trial(setup, state, best, progress)?;
+    let trial = trial(state, best, progress)?;
     state.point = trial.point.clone();
-    state.add(setup, Addition { trial, others: Vec::new(), dropped: Vec::new() })
+    state.add(Addition { trial, others: Vec::new(), dropped: Vec::new() })
 }

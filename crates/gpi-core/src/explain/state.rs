@@ -68,6 +68,8 @@ pub(super) struct BeforeLags {
 
 /// Where a search stands.
 pub(super) struct SearchState<'a> {
+    /// What never changes.
+    pub setup: &'a SearchSetup,
     /// What fits start from; wrong samples of its record are replaced.
     pub prepared: Prepared<'a>,
     /// The model so far.
@@ -88,8 +90,9 @@ pub(super) struct SearchState<'a> {
 
 impl<'a> SearchState<'a> {
     /// From a refined base model.
-    pub(super) fn new(prepared: Prepared<'a>, refined: &Refined) -> Self {
+    pub(super) fn new(setup: &'a SearchSetup, prepared: Prepared<'a>, refined: &Refined) -> Self {
         Self {
+            setup,
             prepared,
             point: refined.fitted.point.clone(),
             cost: refined.fitted.linearization.cost,
@@ -131,29 +134,20 @@ impl<'a> SearchState<'a> {
     }
 
     /// Training squares of a point.
-    pub(super) fn training_squares(
-        &self,
-        setup: &SearchSetup,
-        point: &Point,
-    ) -> Result<f64, Error> {
-        Ok(self.squares(setup, point, &self.prepared.record)?.iter().sum())
+    pub(super) fn training_squares(&self, point: &Point) -> Result<f64, Error> {
+        Ok(self.squares(point, &self.prepared.record)?.iter().sum())
     }
 
     /// Squares of every held-out block.
-    pub(super) fn held_out(&self, setup: &SearchSetup, point: &Point) -> Result<Vec<f64>, Error> {
-        self.squares(setup, point, &setup.test)
+    pub(super) fn held_out(&self, point: &Point) -> Result<Vec<f64>, Error> {
+        self.squares(point, &self.setup.test)
     }
 
     /// Squares of every run that `scored` scores.
-    fn squares(
-        &self,
-        setup: &SearchSetup,
-        point: &Point,
-        scored: &Record,
-    ) -> Result<Vec<f64>, Error> {
+    fn squares(&self, point: &Point, scored: &Record) -> Result<Vec<f64>, Error> {
         // run over the training record, whose initial states were fitted
         let residuals = point.residuals(&self.prepared.record)?;
-        let weights = &setup.options.weighting.outputs;
+        let weights = &self.setup.options.weighting.outputs;
         let mut sums = Vec::new();
         for (residual, experiment) in residuals.iter().zip(scored.experiments()) {
             for run in experiment.scored_rows(residual) {
@@ -165,30 +159,30 @@ impl<'a> SearchState<'a> {
     }
 
     /// The training squares that noise alone would leave.
-    pub(super) fn noise_squares(&self, setup: &SearchSetup) -> Result<f64, Error> {
+    pub(super) fn noise_squares(&self) -> Result<f64, Error> {
         let record = &self.prepared.record;
         let noise = NoiseFloor::estimate(record, &self.point.residuals(record)?);
-        let weights = &setup.options.weighting.outputs;
+        let weights = &self.setup.options.weighting.outputs;
         let squares = noise.rms.iter().zip(weights).map(|(rms, weight)| (rms * weight).powi(2));
         Ok(squares.sum::<f64>() * record.scored() as f64)
     }
 
     /// Remembers what led to the point.
-    pub(super) fn add(&mut self, setup: &SearchSetup, addition: Addition) -> Result<(), Error> {
+    pub(super) fn add(&mut self, addition: Addition) -> Result<(), Error> {
         self.additions.push(addition);
-        self.repair(setup)
+        self.repair()
     }
 
     /// Finds isolated outliers of the residual and replaces them, also where the record is held out: a wrong sample
     /// is no evidence on a model.
     ///
     /// Each time from what was measured: samples that an effect makes stand apart are wrong only until it is known.
-    pub(super) fn repair(&mut self, setup: &SearchSetup) -> Result<(), Error> {
-        let residuals = self.point.residuals(&setup.measured)?;
-        self.wrong = outliers::places(&residuals, &everything(&setup.measured)?, 0);
-        self.prepared.record = repaired(&setup.measured, &residuals, &self.wrong)?;
+    pub(super) fn repair(&mut self) -> Result<(), Error> {
+        let residuals = self.point.residuals(&self.setup.measured)?;
+        self.wrong = outliers::places(&residuals, &everything(&self.setup.measured)?, 0);
+        self.prepared.record = repaired(&self.setup.measured, &residuals, &self.wrong)?;
         // what the next fits are compared with
-        self.cost = self.training_squares(setup, &self.point)?;
+        self.cost = self.training_squares(&self.point)?;
         Ok(())
     }
 }

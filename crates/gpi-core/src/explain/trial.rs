@@ -5,7 +5,6 @@ use super::judgement::Significance;
 use super::policy::FitPolicy;
 use super::ranking::{Ranked, promised};
 use super::score::Score;
-use super::setup::SearchSetup;
 use super::state::{SearchState, Trial};
 use crate::Error;
 use crate::Progress;
@@ -17,21 +16,20 @@ use crate::linear::Section;
 
 /// Fits candidates; where fits take long, only those that may come near the best so far.
 pub(super) fn trials(
-    setup: &SearchSetup,
     state: &SearchState,
     ranked: Vec<Ranked>,
     progress: Progress,
 ) -> Result<Vec<Trial>, Error> {
-    if !setup.is_long(&state.point) {
-        let work = |one, progress: Progress| trial(setup, state, one, progress);
+    if !state.setup.is_long(&state.point) {
+        let work = |one, progress: Progress| trial(state, one, progress);
         return concurrently(ranked, progress, work);
     }
     let mut trials: Vec<Trial> = Vec::new();
     for one in ranked {
         let best = trials.iter().map(|trial| trial.deviance).fold(0.0, f64::max);
         let own = promised(state.prepared.values(), one.score.gain);
-        if own >= setup.policy.ranking.near * best {
-            trials.push(trial(setup, state, one, progress)?);
+        if own >= state.setup.policy.ranking.near * best {
+            trials.push(trial(state, one, progress)?);
         }
     }
     Ok(trials)
@@ -39,20 +37,19 @@ pub(super) fn trials(
 
 /// Fits the whole model with one more effect.
 pub(super) fn trial(
-    setup: &SearchSetup,
     state: &SearchState,
     Ranked { entry, score, .. }: Ranked,
     progress: Progress,
 ) -> Result<Trial, Error> {
     let gain = score.gain;
-    let start = start(setup, state, &state.point, score)?;
-    let (fitted, options) = fitted(setup, state, start, entry, progress)?;
-    let trial = measured(setup, state, &state.point, entry, fitted, options, gain, progress)?;
+    let start = start(state, &state.point, score)?;
+    let (fitted, options) = fitted(state, start, entry, progress)?;
+    let trial = measured(state, &state.point, entry, fitted, options, gain, progress)?;
     if entry.stage != Stage::Plays || trial.deviance <= trial.threshold {
         return Ok(trial);
     }
     // what the same fit gains without the effect is not the effect's
-    let (without, _) = self::fitted(setup, state, state.point.clone(), entry, progress)?;
+    let (without, _) = self::fitted(state, state.point.clone(), entry, progress)?;
     let gained = state.cost / without.linearization.cost.max(f64::MIN_POSITIVE);
     let deviance = trial.deviance - state.prepared.values() * gained.ln().max(0.0);
     Ok(Trial { deviance, ..trial })
@@ -60,21 +57,20 @@ pub(super) fn trial(
 
 /// A point with `entry` as its newest effect, fitted jointly, and what was free at last.
 pub(super) fn fitted(
-    setup: &SearchSetup,
     state: &SearchState,
     start: Point,
     entry: &Entry,
     progress: Progress,
 ) -> Result<(Fitted, FitOptions), Error> {
-    let mut options = setup.options.clone();
+    let mut options = state.setup.options.clone();
     let mut fitted = state.fit(start, &options, entry.name, progress)?;
     if entry.stage == Stage::Plays {
         // the grid has bent to what the plays lacked
-        options = setup.moving_grids.clone();
+        options = state.setup.moving_grids.clone();
         fitted = state.fit(fitted.point, &options, entry.name, progress)?;
     }
-    for _ in 0..setup.policy.fits.more {
-        if !makes_progress(&fitted, &setup.policy.fits) {
+    for _ in 0..state.setup.policy.fits.more {
+        if !makes_progress(&fitted, &state.setup.policy.fits) {
             break;
         }
         fitted = state.fit(fitted.point, &options, entry.name, progress)?;
@@ -84,28 +80,22 @@ pub(super) fn fitted(
 
 /// A point with one more effect: as the score test suggests it, or without effect yet where that is beyond what is
 /// linear or sensible.
-pub(super) fn start(
-    setup: &SearchSetup,
-    state: &SearchState,
-    base: &Point,
-    score: Score,
-) -> Result<Point, Error> {
+pub(super) fn start(state: &SearchState, base: &Point, score: Score) -> Result<Point, Error> {
     let start = base.with_effect(score.start.clone());
     let Some(zero) = score.zero else { return Ok(start) };
     let block = score.start.block();
     let mut limits = block.values().into_iter().zip(block.bounds());
     let is_sensible = limits.all(|(value, (low, high))| low <= value && value <= high);
     let has_plays = block.loops().iter().any(|inner| inner.law.stops() > 0);
-    let FitPolicy { beyond, beyond_with_plays, .. } = setup.policy.fits;
+    let FitPolicy { beyond, beyond_with_plays, .. } = state.setup.policy.fits;
     let most = if has_plays { beyond_with_plays } else { beyond };
-    let squares = |point| state.training_squares(setup, point);
+    let squares = |point| state.training_squares(point);
     let is_near = squares(&start)? <= most * squares(base)?;
     Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })
 }
 
 /// What a fit brought over the present model; `without` is what the effect was added to.
 pub(super) fn measured(
-    setup: &SearchSetup,
     state: &SearchState,
     without: &Point,
     entry: &'static Entry,
@@ -116,12 +106,12 @@ pub(super) fn measured(
 ) -> Result<Trial, Error> {
     let (cost, values) = (fitted.linearization.cost, state.prepared.values());
     let point = fitted.point.clone();
-    let policy = &setup.policy.judgement;
+    let policy = &state.setup.policy.judgement;
     let deviance = values * (state.cost / cost.max(f64::MIN_POSITIVE)).ln();
     let significance = Significance {
         values,
-        added: setup.unknowns(&point).saturating_sub(setup.unknowns(&state.point)),
-        is_long: setup.is_long(&point),
+        added: state.setup.unknowns(&point).saturating_sub(state.setup.unknowns(&state.point)),
+        is_long: state.setup.is_long(&point),
         is_more: state.is_more(entry),
     };
     let mut threshold = significance.threshold(policy);
@@ -131,19 +121,14 @@ pub(super) fn measured(
         let factor = uncertainty.used / uncertainty.estimated.max(1) as f64;
         threshold = significance.threshold_of_autocorrelated(factor, policy);
     }
-    let held_out = state.held_out(setup, &point)?;
-    let is_driven = is_driven(setup, state, without, &point)?;
+    let held_out = state.held_out(&point)?;
+    let is_driven = is_driven(state, without, &point)?;
     Ok(Trial { entry, point, cost, deviance, threshold, held_out, promised, is_driven })
 }
 
 /// Whether it is the input that makes the lags beside G explain what they do: those whose initial state is unknown
 /// also decay from it, and that is a function of time.
-fn is_driven(
-    setup: &SearchSetup,
-    state: &SearchState,
-    without: &Point,
-    with: &Point,
-) -> Result<bool, Error> {
+fn is_driven(state: &SearchState, without: &Point, with: &Point) -> Result<bool, Error> {
     let is_beside = |own: &Section| own.beside.is_some();
     let moves = with.pasts.iter().any(|past| past.moving);
     if !moves || !with.dynamics.sections.iter().any(is_beside) {
@@ -152,8 +137,8 @@ fn is_driven(
     let mut undriven = with.clone();
     let beside = undriven.dynamics.sections.iter_mut().filter(|own| is_beside(own));
     beside.for_each(|own| own.b.fill(0.0));
-    let squares = |point| state.training_squares(setup, point);
-    Ok(squares(&undriven)? > setup.policy.judgement.driven * squares(without)?)
+    let squares = |point| state.training_squares(point);
+    Ok(squares(&undriven)? > state.setup.policy.judgement.driven * squares(without)?)
 }
 
 /// Whether the last steps of a fit that had no more were long ones.
