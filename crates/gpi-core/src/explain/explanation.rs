@@ -1,4 +1,4 @@
-//! What was found, as the user sees it.
+//! The result of a search, as the user sees it.
 
 use super::moved_resonance::Resonance;
 use super::noise;

@@ -176,7 +176,7 @@ fn is_weighty(trial: &Evidence, policy: &JudgementPolicy) -> bool {
     is_substantial || is_near_noise || trial.is_unique || trial.is_more
 }
 
-/// Whether the held-out squares, block by block without and with an effect, have fallen by more than chance.
+/// Whether the held-out squares, block by block without and with an effect, have fallen significantly.
 ///
 /// The sum must fall. Beyond that, either the mean difference of the blocks exceeds its standard error by a factor,
 /// or the blocks that become better gain far more than the others lose: an effect may show in few blocks only, and

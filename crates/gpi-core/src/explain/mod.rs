@@ -128,7 +128,7 @@ pub fn explain(
     let mut patient = |_: &str, _: f64| true;
     let last: Progress = if interrupted { &mut patient } else { progress };
     let refinement = finish(&mut state, interrupted, last)?;
-    // what rules out that the input's side alone is wrong
+    // rules out that something in front of G is the only cause
     let has_loops = state.point.loops().next().is_some();
     let moved_resonance = if has_loops && !interrupted {
         let policy = &setup.policy.resonance;

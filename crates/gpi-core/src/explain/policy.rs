@@ -215,7 +215,7 @@ policy! {
         /// An effect that takes a smaller part of the squares is of no practical use: 4 % of the squares are 2 % of
         /// the rms error. By hand.
         least: f64 = 0.04, PART;
-        /// Candidates that a round compares, all families together: the best of so many must beat chance. Counted.
+        /// Candidates that a round compares, all effects together: the largest of so many gains on noise must be exceeded.
         looks: f64 = 150.0, FROM_ONE;
         /// Gains beyond this factor times the threshold for white noise need no test against the residual's
         /// autocorrelation, which would raise the threshold by less. It saves the covariance of long records. By hand.
@@ -254,15 +254,15 @@ policy! {
 
     /// When the noise itself is called an effect.
     struct NoisePolicy {
-        /// Wrong samples of which fewer may be chance, or the way in which a record was cut. By hand.
+        /// Fewer wrong samples may be noise, or come from the way in which a record was cut. By hand.
         fewest: usize = 3, FROM_ONE;
         /// Part of them that may follow a jump of the input: where most do, the model errs at jumps. By hand.
         after_jumps: f64 = 0.5, PART;
         /// Samples that follow a jump, and the part of the input's changes that are no jumps. By hand.
         shortly: usize = 8, FROM_ONE;
         no_jumps: f64 = 0.99, PART;
-        /// A residual so many times larger than the noise at rest is the stage's; slow noise shows only in part while
-        /// the input rests, hence not nearer to one. By hand.
+        /// A residual so many times larger than the noise at rest comes from the stage. The factor is well above one
+        /// because slow noise shows only in part while the input rests. By hand.
         louder: f64 = 2.5, FROM_ONE;
         /// Where the input never rests: a residual of this part of the output's span is no sensor's noise. By hand.
         loud: f64 = 0.02, PART;
@@ -291,7 +291,7 @@ pub(super) mod score {
     pub(in crate::explain) const RANK: f64 = 1e-11;
     /// Eigenvalues of a candidate's scaled Gram matrix below this are not solved for: the projection has cost digits.
     pub(in crate::explain) const OWN_RANK: f64 = 1e-9;
-    /// A column of which a smaller part is left beside the model's sensitivities is the model's own.
+    /// A column of which the projection leaves a smaller part is in the span of the model's sensitivities.
     pub(in crate::explain) const LEFT: f64 = 1e-7;
     /// Numbers that the columns held at once may take: 96 MB.
     pub(in crate::explain) const AT_ONCE: usize = 12_000_000;

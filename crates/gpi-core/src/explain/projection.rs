@@ -20,21 +20,20 @@ use nalgebra::DVector;
 /// Makes columns (samples, outputs) of an experiment.
 type Columns<'a> = &'a dyn Fn(&Signals, &Matrix, &Experiment, usize) -> Result<Vec<Matrix>, Error>;
 
-/// Columns beside the base model's sensitivities.
+/// Columns without what the model's sensitivities can express.
 pub(crate) struct Projection {
-    /// Inner products of what is left of the columns.
+    /// `C' (I - Q) C`, (columns, columns).
     pub left: Matrix,
-    /// Inner products of what is left with the residual.
+    /// `C' (I - Q) e`.
     pub score: DVector<f64>,
-    /// Squares of the columns as they were.
+    /// Squares of the columns before the projection.
     pub squares: DVector<f64>,
-    /// What the base model would leave of the residual's squares by itself.
+    /// `e' (I - Q) e`.
     pub cost: f64,
 }
 
 impl Base<'_> {
-    /// So many columns beside the model's own, projected off its sensitivities. `columns` makes them for an
-    /// experiment from the signals and the output, and its place.
+    /// Projects n columns. `columns` makes them for an experiment from its signals, its output and its index.
     pub(crate) fn project(&self, n: usize, columns: Columns) -> Result<Projection, Error> {
         let unknowns = self.linearization.layout.len;
         let mut cross = Matrix::zeros(unknowns, n);

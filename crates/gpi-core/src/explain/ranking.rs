@@ -79,8 +79,8 @@ pub(super) fn promised(values: f64, gain: f64) -> f64 {
     -values * (1.0 - gain).max(1e-300).ln()
 }
 
-/// Whether a function of time explains most of what it does with a part of its knots, as the score two places
-/// before tells: else it follows something that is not slow.
+/// Whether a function of time explains most of what it does with fewer knots, as the score two places before says.
+/// Otherwise it follows something that is not slow.
 fn is_slow(scores: &[Score], place: usize, policy: &RankingPolicy) -> bool {
     let knots = |score: &Score| score.start.block().values().len();
     let score = &scores[place];

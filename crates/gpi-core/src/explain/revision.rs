@@ -1,4 +1,4 @@
-//! What was found is looked at again once more is known.
+//! Earlier decisions, examined again once more is known.
 
 use super::judgement::is_superfluous;
 use super::ranking::{Ranked, scored_beside};
@@ -12,7 +12,7 @@ use crate::fit::memory::Memory;
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::fit::preparation::rescale;
 
-/// Puts what is added to the other side of the output stage where that explains more.
+/// Moves added signals to the other side of the output stage where that explains more.
 pub(super) fn rearrange(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
     if !state.point.senses() {
         return Ok(());
@@ -57,8 +57,8 @@ pub(super) fn drop_superfluous(state: &mut SearchState, progress: Progress) -> R
     Ok(())
 }
 
-/// The best fit without one of the effects. The newest starts from the score test anew too: beside the one that goes
-/// it may have become what no fit leads back from.
+/// The best fit without one of the effects. The newest effect is also started from the score test again, because in the
+/// presence of the dropped one it may have moved to where no fit leads back from.
 fn without(
     state: &SearchState,
     place: usize,
@@ -78,7 +78,7 @@ fn without(
     Ok(if is_better { anew } else { refitted })
 }
 
-/// Puts what the input drives in the place of a slow function of time, which fits much, where it explains as much.
+/// Replaces a slow function of time, which can fit much, by an effect that the input drives and that explains as much.
 pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
     let is_slow = |entry: &Entry| entry.signature == Signature::SlowInTime;
     let driven: Vec<&'static Entry> =

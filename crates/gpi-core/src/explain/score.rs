@@ -32,8 +32,7 @@ pub(crate) struct Score {
     pub columns: usize,
 }
 
-/// Tests candidates against a base point: every probe's column, projected off the base model's own
-/// sensitivities, takes a part of what is left of the residual.
+/// Scores candidates against a base point, as many at once as memory allows.
 pub(crate) fn scores(
     base: &Base,
     candidates: &[Candidate],

@@ -25,7 +25,7 @@ pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Err
 fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let policy = &state.setup.policy.ranking;
     let mut best = ranked(state, progress)?;
-    // A strong candidate is looked at first: the grid would bend to what it explains.
+    // A strong candidate is fitted first: a finer grid would partly replace it.
     let most = best.iter().map(|one| one.score.gain).fold(0.0, f64::max);
     if most < policy.strong && !state.is_rich && refine_grids(state, progress)? {
         best = ranked(state, progress)?;
@@ -37,7 +37,7 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     }
     best.truncate(policy.fitted);
     let mut trials = trials(state, best, progress)?;
-    // what is explained, less what so many parameters would explain of noise
+    // by what is explained beyond the significance threshold
     trials.sort_by(|a, b| (b.deviance - b.threshold).total_cmp(&(a.deviance - a.threshold)));
     let before = state.held_out(&state.point)?;
     let noise = state.noise_squares()?;

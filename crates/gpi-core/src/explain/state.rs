@@ -1,4 +1,4 @@
-//! Where a search stands: the model so far, what it leaves, and what was added to it.
+//! The state of a search: the model so far, its squares, and what was added to it.
 
 use super::repair::{everything, repaired};
 use super::setup::SearchSetup;
@@ -66,7 +66,7 @@ pub(super) struct BeforeLags {
     pub additions: usize,
 }
 
-/// Where a search stands.
+/// The state of a search.
 pub(super) struct SearchState<'a> {
     /// What never changes.
     pub setup: &'a SearchSetup,
@@ -176,7 +176,7 @@ impl<'a> SearchState<'a> {
     /// Finds isolated outliers of the residual and replaces them, also where the record is held out: a wrong sample
     /// is no evidence on a model.
     ///
-    /// Each time from what was measured: samples that an effect makes stand apart are wrong only until it is known.
+    /// Each time from what was measured: samples that an effect explains are no longer outliers once it is added.
     pub(super) fn repair(&mut self) -> Result<(), Error> {
         let residuals = self.point.residuals(&self.setup.measured)?;
         self.wrong = outliers::places(&residuals, &everything(&self.setup.measured)?, 0);

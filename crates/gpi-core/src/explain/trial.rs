@@ -65,7 +65,7 @@ pub(super) fn fitted(
     let mut options = state.setup.options.clone();
     let mut fitted = state.fit(start, &options, entry.name, progress)?;
     if entry.stage == Stage::Plays {
-        // the grid has bent to what the plays lacked
+        // the grid was placed to replace what the plays lacked
         options = state.setup.moving_grids.clone();
         fitted = state.fit(fitted.point, &options, entry.name, progress)?;
     }

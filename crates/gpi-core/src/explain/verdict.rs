@@ -6,7 +6,7 @@ use crate::Record;
 use crate::effects::{CATALOGUE, SeparatedBy};
 use crate::spectrum::is_one_sine;
 
-/// How far what was measured is explained.
+/// How far the record is explained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {

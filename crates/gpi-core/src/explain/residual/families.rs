@@ -25,7 +25,7 @@ pub(super) struct ScaledSignal {
     /// Over its root mean square.
     pub speed: Signal,
     /// How large the fast changes of the level are.
-    pub swing: Signal,
+    pub amplitude: Signal,
 }
 
 /// What a residual of one output is compared with.
@@ -73,7 +73,7 @@ impl ScaledSignals {
             return families;
         };
         level.powers(x, 1..=5);
-        amplitude.regressors.push(Box::new(|e, k| self.output.swing[e][k] * x[e][k]));
+        amplitude.regressors.push(Box::new(|e, k| self.output.amplitude[e][k] * x[e][k]));
         for input in &self.inputs {
             past_input.past(input, &policy.past);
             let s = |e: usize, k: usize| input.speed[e][k].clamp(-policy.fastest, policy.fastest);
@@ -85,8 +85,8 @@ impl ScaledSignals {
                 let sign = move |e: usize, k: usize| sign(input.speed[e][k]);
                 direction.regressors.push(Box::new(move |e, k| sign(e, k) * x[e][k].powi(power)));
             }
-            let swing = &self.output.swing;
-            amplitude.regressors.push(Box::new(move |e, k| swing[e][k] * input.speed[e][k]));
+            let size = &self.output.amplitude;
+            amplitude.regressors.push(Box::new(move |e, k| size[e][k] * input.speed[e][k]));
         }
         self.intermediates.iter().for_each(|v| past_intermediate.past(v, &policy.past));
         let time = |e: usize, k: usize| 2.0 * k as f64 / self.samples[e] as f64 - 1.0;
@@ -133,8 +133,8 @@ impl ScaledSignal {
         let count = speed.iter().map(Vec::len).sum::<usize>() as f64;
         let scale = (squares / count).sqrt().max(f64::MIN_POSITIVE);
         speed.iter_mut().flatten().for_each(|s| *s /= scale);
-        let swing = level.iter().map(|x| swelling(x, window)).collect();
-        Self { level, speed, swing }
+        let amplitude = level.iter().map(|x| local_amplitude(x, window)).collect();
+        Self { level, speed, amplitude }
     }
 
     /// The level, then the steps so many samples ago.
@@ -164,7 +164,7 @@ fn sign(s: f64) -> f64 {
 }
 
 /// The local amplitude of a signal: the square of its fast part, smoothed over so many samples.
-fn swelling(signal: &[f64], samples: f64) -> Vec<f64> {
+fn local_amplitude(signal: &[f64], samples: f64) -> Vec<f64> {
     let keep = (-1.0 / samples.max(1.0)).exp();
     let (mut slow, mut square) = (signal.first().copied().unwrap_or(0.0), 0.0);
     signal

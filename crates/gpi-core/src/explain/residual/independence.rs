@@ -1,10 +1,10 @@
 //! Dependence of the residual on other signals, for noise of any autocorrelation.
 
-use super::chance::{normal_beyond, normal_tails};
 use super::compared::Compared;
 use super::families::{Family, Regressor};
 use super::outcome::ResidualTest;
 use super::policy::ResidualPolicy;
+use super::significance::{normal_beyond, normal_tails};
 
 /// Products of residual and regressor, summed over blocks of time.
 pub(super) struct BlockSums {
@@ -40,7 +40,7 @@ pub(super) fn independence(
     given: &Compared,
     output: usize,
     family: &Family,
-    chance: f64,
+    significance: f64,
 ) -> ResidualTest {
     let scored = given.record.scored();
     let t = |regressor: &Regressor| {
@@ -55,16 +55,16 @@ pub(super) fn independence(
     };
     let each: Vec<f64> = family.regressors.iter().map(t).collect();
     let points_to = family.points_to.clone();
-    dependence(family.name, points_to, output, &each, chance, given.policy)
+    dependence(family.name, points_to, output, &each, significance, given.policy)
 }
 
-/// A test from the t of each of its regressors, which share its chance.
+/// A test from the t of each of its regressors, which share its significance level.
 pub(super) fn dependence(
     name: &'static str,
     points_to: String,
     output: usize,
     each: &[f64],
-    chance: f64,
+    significance: f64,
     policy: &ResidualPolicy,
 ) -> ResidualTest {
     let statistic = each.iter().map(|t| t.abs()).fold(0.0, f64::max);
@@ -73,7 +73,7 @@ pub(super) fn dependence(
         name,
         output,
         statistic,
-        threshold: normal_beyond(chance / regressors).max(policy.standard_errors),
+        threshold: normal_beyond(significance / regressors).max(policy.standard_errors),
         p_value: (regressors * normal_tails(statistic)).min(1.0),
         points_to,
     }

@@ -20,30 +20,31 @@ pub(super) fn level_to_level(
     given: &Compared,
     output: usize,
     signals: &ScaledSignals,
-    chance: f64,
+    significance: f64,
 ) -> ResidualTest {
     let contrasts: Vec<Signal> = signals.inputs.iter().map(|u| contrast(given, u)).collect();
     let each = slopes(given, output, signals, &contrasts).unwrap_or_default();
     let (name, policy) = ("level-to-level", given.policy);
-    dependence(name, points_to(name, ""), output, &each, chance, policy)
+    dependence(name, points_to(name, ""), output, &each, significance, policy)
 }
 
 /// Minus one where the amplitude is small, one where it is large: each the samples of a third of its energy.
 fn contrast(given: &Compared, input: &ScaledSignal) -> Signal {
-    let mut scored: Vec<f64> = given.scored().map(|(e, k)| input.swing[e][k]).collect();
+    let mut scored: Vec<f64> = given.scored().map(|(e, k)| input.amplitude[e][k]).collect();
     scored.sort_by(f64::total_cmp);
     let total: f64 = scored.iter().sum();
     let limit = |share: f64| {
         let mut energy = 0.0;
-        let reached = scored.iter().find(|swing| {
-            energy += **swing;
+        let reached = scored.iter().find(|amplitude| {
+            energy += **amplitude;
             energy >= share * total
         });
         reached.copied().unwrap_or(0.0)
     };
     let (small, large) = (limit(1.0 / 3.0), limit(2.0 / 3.0));
-    let group = |swing: &f64| f64::from(i8::from(*swing > large) - i8::from(*swing <= small));
-    input.swing.iter().map(|swings| swings.iter().map(group).collect()).collect()
+    let group =
+        |amplitude: &f64| f64::from(i8::from(*amplitude > large) - i8::from(*amplitude <= small));
+    input.amplitude.iter().map(|amplitudes| amplitudes.iter().map(group).collect()).collect()
 }
 
 /// The t of every contrast; `None` where the regression has no solution.

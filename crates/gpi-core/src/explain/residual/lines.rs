@@ -1,9 +1,9 @@
 //! Lines in the residual's spectrum.
 
-use super::chance::exceeded_with;
 use super::compared::Compared;
 use super::outcome::{ResidualTest, points_to};
 use super::policy::ResidualPolicy;
+use super::significance::exceeded_with;
 use crate::Matrix;
 use crate::spectrum::tapered;
 use crate::uncertainty::noise_model::Colour;
@@ -28,7 +28,7 @@ pub(super) fn flattened(given: &Compared) -> Vec<Matrix> {
     Colour::of(&smooth, given.record).whiten(given.residuals)
 }
 
-/// A signal, tapered, with the narrow peaks of its spectrum cut down to what is beside them.
+/// A signal, tapered, with the narrow peaks of its spectrum cut down to the background on both sides.
 fn without_lines(values: &[f64], policy: &ResidualPolicy) -> Vec<f64> {
     let ResidualPolicy { line_near: near, line_far: far, stands_out, .. } = *policy;
     let n = values.len();
@@ -50,7 +50,7 @@ fn without_lines(values: &[f64], policy: &ResidualPolicy) -> Vec<f64> {
 
 /// The largest line of the periodogram over the median of those around it (Fisher's test, against the
 /// local background): the same for noise of any smooth spectrum.
-pub(super) fn lines(given: &Compared, output: usize, chance: f64) -> ResidualTest {
+pub(super) fn lines(given: &Compared, output: usize, significance: f64) -> ResidualTest {
     let around = given.policy.around;
     let (mut most, mut count) = (0.0_f64, 0.0_f64);
     for (residual, experiment) in given.residuals.iter().zip(given.record.experiments()) {
@@ -68,7 +68,7 @@ pub(super) fn lines(given: &Compared, output: usize, chance: f64) -> ResidualTes
         name: "lines",
         output,
         statistic: most,
-        threshold: exceeded_with(chance, tail),
+        threshold: exceeded_with(significance, tail),
         p_value: tail(most).min(1.0),
         points_to: points_to("lines", ""),
     }
@@ -91,7 +91,7 @@ fn median(values: &[f64]) -> f64 {
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The chance that one exponential number exceeds the median of the others by this ratio.
+/// The probability that one exponential number exceeds the median of the others by this ratio.
 ///
 /// `E exp(-ratio m)` of the m that is the j-th smallest of n exponential numbers is
 /// `prod_i (n - i) / (n - i + ratio)` for i from 0 to j - 1; j is one below the place of the median, which

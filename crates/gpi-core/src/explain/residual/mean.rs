@@ -5,11 +5,11 @@ use super::independence::{BlockSums, dependence};
 use super::outcome::{ResidualTest, points_to};
 
 /// Whether the residual is zero on average.
-pub(super) fn mean(given: &Compared, output: usize, chance: f64) -> ResidualTest {
+pub(super) fn mean(given: &Compared, output: usize, significance: f64) -> ResidualTest {
     let mut sums = BlockSums::new(given.record.scored(), given.policy.blocks);
     for (experiment, k) in given.scored() {
         sums.add(given.residuals[experiment][(k, output)]);
     }
     let points_to = points_to("mean", "an offset that changed");
-    dependence("mean", points_to, output, &[sums.t()], chance, given.policy)
+    dependence("mean", points_to, output, &[sums.t()], significance, given.policy)
 }

@@ -1,9 +1,8 @@
-//! What a residual still contains: named tests, each with what it points to.
+//! Named tests of a residual, each with the effects that it points to.
 //!
-//! Every test has a chance of a hundredth over the number of tests to fail where there is nothing, so that
-//! all together fail once in a hundred records of pure noise, or less often.
+//! The significance level of every test is one hundredth over the number of tests (Bonferroni's correction), so that
+//! at most one record of pure noise in a hundred fails any of them.
 
-mod chance;
 mod compared;
 mod families;
 mod independence;
@@ -12,6 +11,7 @@ mod lines;
 mod mean;
 mod outcome;
 mod policy;
+mod significance;
 #[cfg(test)]
 mod simulated;
 mod whiteness;
@@ -30,7 +30,7 @@ use policy::ResidualPolicy;
 /// How the residual of a model is taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ResidualOptions {
-    /// Fit what was before the first sample, see [`residuals_from_fitted_start`].
+    /// Fit the unknown initial state, see [`residuals_from_fitted_start`].
     pub fit_start: bool,
     /// Take the mean of each experiment's residual out, for sensors whose offset moves between them.
     pub remove_mean: bool,
@@ -125,24 +125,24 @@ fn analyse(measured: &Compared) -> Vec<ResidualTest> {
     let squares = given.centred(&squares);
     let power = Compared { residuals: &squares, ..*given };
     let outputs = given.record.outputs().len();
-    let chance = policy.chance / (outputs * NAMES.len()) as f64;
+    let significance = policy.significance / (outputs * NAMES.len()) as f64;
     let mut tests = Vec::new();
     for output in 0..outputs {
-        tests.push(mean::mean(measured, output, chance));
-        tests.push(whiteness::whiteness(given, output, chance));
-        tests.push(lines::lines(&whitened, output, chance));
+        tests.push(mean::mean(measured, output, significance));
+        tests.push(whiteness::whiteness(given, output, significance));
+        tests.push(lines::lines(&whitened, output, significance));
         let signals = ScaledSignals::new(given, output);
         let families = signals.families(policy);
         for family in &families {
-            tests.push(independence::independence(given, output, family, chance));
+            tests.push(independence::independence(given, output, family, significance));
         }
-        tests.push(level_to_level::level_to_level(given, output, &signals, chance));
+        tests.push(level_to_level::level_to_level(given, output, &signals, significance));
         let present = families.into_iter().filter(|family| !family.name.starts_with("past-"));
         let name = "higher-order";
         let cause = "noise that depends on the input or on time, many small effects";
         let regressors = present.flat_map(|family| family.regressors).collect();
         let all = Family { name, points_to: points_to(name, cause), regressors };
-        tests.push(independence::independence(&power, output, &all, chance));
+        tests.push(independence::independence(&power, output, &all, significance));
         tests.push(wrong_samples::wrong_samples(given, output));
     }
     tests

@@ -1,4 +1,4 @@
-//! What a test of a residual comes to.
+//! The result of a residual test, and the effects that it points to.
 
 use crate::effects::CATALOGUE;
 
@@ -11,15 +11,15 @@ pub struct ResidualTest {
     pub output: usize,
     /// What is compared with the threshold.
     pub statistic: f64,
-    /// What the statistic must not exceed: the value that it exceeds with a chance of a hundredth over the
+    /// The value that the statistic must not exceed. It does so with a probability of a hundredth over the
     /// number of tests (of all outputs) where there is nothing.
     ///
     /// It is raised where that would be of no practical size: for `whiteness` to a hundredth of the
     /// residual's variance in its correlations; for the statistics t of `mean`, `level-to-level`,
-    /// `higher-order` and all dependences, whose chance is shared by their regressors, to 4. `outliers`
+    /// `higher-order` and all dependences, whose regressors share the probability, to 4. `outliers`
     /// allows two.
     pub threshold: f64,
-    /// The chance, at most, that a residual without structure gives a statistic this large or larger; all
+    /// The probability, at most, that a residual without structure gives a statistic this large or larger; all
     /// regressors or lines of this one test are allowed for, the other tests are not.
     pub p_value: f64,
     /// What it points to when it fails.

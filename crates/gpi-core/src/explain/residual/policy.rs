@@ -8,7 +8,7 @@ policy! {
     /// How a residual is tested.
     struct ResidualPolicy {
         /// Probability that any test of a record fails where there is nothing: one record in a hundred.
-        chance: f64 = 0.01, PART;
+        significance: f64 = 0.01, PART;
         /// Residuals below this part of the simulation's largest value are rounding.
         rounding: f64 = 1e-13, PART;
         /// Blocks of time over which products are summed: few enough that one is longer than the noise's
@@ -66,7 +66,10 @@ mod tests {
         let usual = ResidualPolicy::default();
         usual.validate().unwrap();
         let refused = |policy: ResidualPolicy| policy.validate().unwrap_err().to_string();
-        assert!(refused(ResidualPolicy { chance: -0.1, ..usual.clone() }).contains("chance"));
+        assert!(
+            refused(ResidualPolicy { significance: -0.1, ..usual.clone() })
+                .contains("significance")
+        );
         assert!(refused(ResidualPolicy { blocks: 0, ..usual.clone() }).contains("blocks"));
         assert!(refused(ResidualPolicy { small: f64::NAN, ..usual }).contains("small"));
     }

@@ -1,11 +1,11 @@
 //! Autocorrelation of the residual.
 
-use super::chance::{chi_square_tail, exceeded_with};
 use super::compared::Compared;
 use super::outcome::{ResidualTest, WHITENESS, points_to};
+use super::significance::{chi_square_tail, exceeded_with};
 
 /// Ljung and Box: `Q = n (n + 2) sum_k r_k^2 / (n - k)` over the first lags of the autocorrelation.
-pub(super) fn whiteness(given: &Compared, output: usize, chance: f64) -> ResidualTest {
+pub(super) fn whiteness(given: &Compared, output: usize, significance: f64) -> ResidualTest {
     let lags = given.policy.lags;
     let mut covariances = vec![0.0; lags + 1];
     let mut n = 0.0;
@@ -28,7 +28,7 @@ pub(super) fn whiteness(given: &Compared, output: usize, chance: f64) -> Residua
         name: WHITENESS,
         output,
         statistic,
-        threshold: exceeded_with(chance, tail).max(given.policy.small * n),
+        threshold: exceeded_with(significance, tail).max(given.policy.small * n),
         p_value: tail(statistic),
         points_to: points_to(WHITENESS, "dynamics that the model lacks"),
     }

@@ -1,8 +1,8 @@
 //! Isolated wrong samples.
 
-use super::chance::at_least;
 use super::compared::Compared;
 use super::outcome::{ResidualTest, points_to};
+use super::significance::at_least;
 use crate::uncertainty::outliers;
 
 const NAME: &str = "outliers";
