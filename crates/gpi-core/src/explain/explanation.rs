@@ -142,8 +142,10 @@ pub(super) fn summarise(
     rejected.extend(state.additions.iter().flat_map(|one| one.others.iter().cloned()));
     rejected.retain(|one| !effects.contains(&one.effect));
     let verdict = verdict::verdict(&effects, &tests);
+    let policy = &state.setup.policy.proposal;
+    let next = verdict::next_experiment(&rejected, &effects, &tests, verdict, record, policy);
     Ok(Explanation {
-        next_experiment: verdict::next_experiment(&rejected, &effects, &tests, verdict, record),
+        next_experiment: next,
         held_out: mended.experiments().iter().map(|e| e.held_out.clone()).collect(),
         wrong_samples: state.wrong.clone(),
         warmups: mended.experiments().iter().map(|e| e.warmup).collect(),

@@ -52,7 +52,7 @@ pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Resul
         }
         let (point, cost) = on_moving_grids(state, point, progress)?;
         let deviance = values * (state.cost / cost.max(f64::MIN_POSITIVE)).ln();
-        // a play has two numbers
+        // two numbers of a play, priced as in the BIC
         if deviance < 2.0 * added as f64 * values.ln() {
             break;
         }
@@ -102,6 +102,7 @@ fn enriched(state: &SearchState) -> Result<(Point, usize), Error> {
     };
     let Projection { mut left, mut score, squares, cost } = base.project(places.len(), &columns)?;
     let values = prepared.values();
+    // two numbers of a play, priced as in the BIC
     let least = (2.0 * values.ln() / values).max(policy.least) * cost;
     let mut point = point.clone();
     let mut added = 0;

@@ -30,6 +30,7 @@ mod residual;
 mod revision;
 mod score;
 mod search;
+mod settings;
 mod setup;
 mod state;
 mod trial;

@@ -3,80 +3,8 @@
 //! "By hand" means that nobody derived the value: it was chosen on simulated stages, and docs/scoreboard.md
 //! shows what all values together achieve. "Squares" are weighted sums of squared residuals.
 
+use super::settings::{FROM_ONE, PART, POSITIVE, settings};
 use crate::Error;
-use std::ops::RangeInclusive;
-
-/// A part of something.
-pub(super) const PART: RangeInclusive<f64> = 0.0..=1.0;
-/// At least one, or a factor that must not shrink what it is applied to.
-pub(super) const FROM_ONE: RangeInclusive<f64> = 1.0..=1e12;
-/// Any positive size.
-pub(super) const POSITIVE: RangeInclusive<f64> = f64::MIN_POSITIVE..=1e12;
-
-/// What a policy is made of.
-pub(super) trait Setting {
-    /// Whether every number lies in a range.
-    fn lies_in(&self, range: &RangeInclusive<f64>) -> bool;
-}
-
-impl Setting for f64 {
-    fn lies_in(&self, range: &RangeInclusive<f64>) -> bool {
-        range.contains(self)
-    }
-}
-
-impl Setting for usize {
-    fn lies_in(&self, range: &RangeInclusive<f64>) -> bool {
-        range.contains(&(*self as f64))
-    }
-}
-
-impl<T: Setting, const N: usize> Setting for [T; N] {
-    fn lies_in(&self, range: &RangeInclusive<f64>) -> bool {
-        self.iter().all(|value| value.lies_in(range))
-    }
-}
-
-/// Refuses a value outside the range in which it means something.
-pub(super) fn require<T: Setting + std::fmt::Debug>(
-    name: &'static str,
-    value: &T,
-    range: &RangeInclusive<f64>,
-) -> Result<(), Error> {
-    if value.lies_in(range) {
-        return Ok(());
-    }
-    let requirement = format!("must lie between {} and {}", range.start(), range.end());
-    Err(Error::parameter(name, format!("{value:?}"), requirement))
-}
-
-/// Declares a struct of settings: each field with its type, its default and the range in which it means something.
-macro_rules! policy {
-    ($($(#[$about:meta])* struct $name:ident {
-        $($(#[$meaning:meta])* $field:ident: $kind:ty = $value:expr, $range:expr;)*
-    })*) => {$(
-        $(#[$about])*
-        #[derive(Clone, Debug, PartialEq)]
-        pub(crate) struct $name {
-            $($(#[$meaning])* pub $field: $kind,)*
-        }
-
-        impl Default for $name {
-            fn default() -> Self {
-                Self { $($field: $value,)* }
-            }
-        }
-
-        impl $name {
-            /// Refuses settings that mean nothing.
-            pub(crate) fn validate(&self) -> Result<(), Error> {
-                $(crate::explain::policy::require(stringify!($field), &self.$field, &$range)?;)*
-                Ok(())
-            }
-        }
-    )*};
-}
-pub(super) use policy;
 
 /// How [`explain`](super::explain) searches.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -97,6 +25,8 @@ pub(crate) struct SearchPolicy {
     pub noise: NoisePolicy,
     /// When a resonance is said to have moved.
     pub resonance: ResonancePolicy,
+    /// What experiment is proposed.
+    pub proposal: ProposalPolicy,
 }
 
 impl SearchPolicy {
@@ -109,11 +39,12 @@ impl SearchPolicy {
         self.judgement.validate()?;
         self.revision.validate()?;
         self.noise.validate()?;
-        self.resonance.validate()
+        self.resonance.validate()?;
+        self.proposal.validate()
     }
 }
 
-policy! {
+settings! {
     /// Blocks of time that no fit of the search sees.
     struct HoldoutPolicy {
         /// Blocks of an experiment: enough of them for a standard error of their differences, few enough that
@@ -248,6 +179,8 @@ policy! {
         superfluous: f64 = 1.5, FROM_ONE;
         /// Factor by which the held-out squares may grow when a driven effect replaces a slow function of time. By hand.
         driven_instead: f64 = 1.05, FROM_ONE;
+        /// Times the steps of a trial that its fit may take: it has lost what it started from. By hand.
+        longer: usize = 2, FROM_ONE;
         /// Factor by which the squares may grow when an effect replaces slow poles of G. By hand.
         instead_of_lags: f64 = 1.05, FROM_ONE;
     }
@@ -282,6 +215,15 @@ policy! {
         /// Steps of the fit to each experiment, and the part of the squares below which a step is the last. By hand.
         steps: usize = 8, FROM_ONE;
         gain: f64 = 1e-4, PART;
+    }
+
+    /// What experiment is proposed.
+    struct ProposalPolicy {
+        /// Seconds of it, long enough for creep, and the most samples, few enough to be handled. By hand.
+        seconds: f64 = 600.0, POSITIVE;
+        samples: f64 = 1e6, FROM_ONE;
+        /// Periods of a triangle in that time. By hand.
+        periods: f64 = 20.0, POSITIVE;
     }
 }
 

@@ -90,8 +90,8 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
         let without = state.point.without_effect(place);
         let best = scored_beside(state, &without, &driven, progress)?.into_iter().next();
         let Some(Ranked { entry, score, .. }) = best else { continue };
-        let options =
-            FitOptions { steps: 2 * state.setup.options.steps, ..state.setup.options.clone() };
+        let steps = state.setup.policy.revision.longer * state.setup.options.steps;
+        let options = FitOptions { steps, ..state.setup.options.clone() };
         let gain = score.gain;
         let start = start(state, &without, score)?;
         let fitted = state.fit(start, &options, entry.name, progress)?;

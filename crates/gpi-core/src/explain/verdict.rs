@@ -1,5 +1,6 @@
 //! The verdict of an explanation, and what to measure next.
 
+use super::policy::ProposalPolicy;
 use super::residual::{ResidualTest, STRUCTURE, WHITENESS};
 use super::state::Rejected;
 use crate::Record;
@@ -105,13 +106,14 @@ pub(super) fn next_experiment(
     tests: &[ResidualTest],
     verdict: Verdict,
     record: &Record,
+    policy: &ProposalPolicy,
 ) -> Option<NextExperiment> {
     let (low, high) = crate::chain::point::range(record, 0);
     let rate = record.rate();
-    let duration = 600.0_f64.min(1e6 / rate);
+    let duration = policy.seconds.min(policy.samples / rate);
     let command = |kind: &str| {
         // a number that can be typed
-        let frequency = format!(" --frequency {}", (20e4 / duration).round() / 1e4);
+        let frequency = format!(" --frequency {}", (1e4 * policy.periods / duration).round() / 1e4);
         let frequency = if kind == TRIANGLE { frequency } else { String::new() };
         format!(
             "gpi excite {kind} --rate {rate} --duration {duration}{frequency} --range {low} {high} -o next.csv"
@@ -170,7 +172,15 @@ mod tests {
     fn confused(effect: &'static str, with: &'static str) -> NextExperiment {
         let rejected =
             Rejected { effect, holdout_rms: 1.0, why: String::new(), confounded_with: vec![with] };
-        next_experiment(&[rejected], &[with], &[], Verdict::Explained, &record()).unwrap()
+        next_experiment(
+            &[rejected],
+            &[with],
+            &[],
+            Verdict::Explained,
+            &record(),
+            &ProposalPolicy::default(),
+        )
+        .unwrap()
     }
 
     #[test]
@@ -188,6 +198,16 @@ mod tests {
 
     #[test]
     fn nothing_is_asked_for_where_all_is_explained() {
-        assert_eq!(next_experiment(&[], &[], &[], Verdict::Explained, &record()), None);
+        assert_eq!(
+            next_experiment(
+                &[],
+                &[],
+                &[],
+                Verdict::Explained,
+                &record(),
+                &ProposalPolicy::default()
+            ),
+            None
+        );
     }
 }

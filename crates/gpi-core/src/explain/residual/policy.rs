@@ -2,9 +2,9 @@
 //! policy).
 
 use crate::Error;
-use crate::explain::policy::{FROM_ONE, PART, POSITIVE, policy};
+use crate::explain::settings::{FROM_ONE, PART, POSITIVE, settings};
 
-policy! {
+settings! {
     /// How a residual is tested.
     struct ResidualPolicy {
         /// Probability that any test of a record fails where there is nothing: one record in a hundred.
