@@ -21,7 +21,7 @@ pub(crate) fn test_rows<'py>(
         row.set_item("threshold", test.threshold)?;
         row.set_item("p_value", test.p_value)?;
         row.set_item("passed", test.passed())?;
-        row.set_item("points_to", test.points_to)?;
+        row.set_item("points_to", &test.points_to)?;
         Ok(row)
     };
     tests.iter().map(row).collect()

@@ -3,6 +3,7 @@
 //! `u_s(k) = u_s(k-1) + clamp(u(k) - u_s(k-1), -s Ts, s Ts)`, (E2) in the documentation's theory, with the
 //! limit s and the sampling interval Ts: the drive follows the input, but never faster than s.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, InputStage, Proposal, Quantity, Situation, Stage, Units};
 
 /// The drive cannot change faster than s: `|du_s/dt| <= s`.
@@ -20,6 +21,11 @@ impl AmplifierSlew {
     pub(super) const STAGE: Stage = Stage::Input;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["speed"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// Limits at quantiles of the record's steps: an amplifier that is slower than most of the steps is seen
     /// without a search.

@@ -3,6 +3,7 @@
 //! `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`, (E10) in the documentation's theory: the output follows the
 //! displacement x only while the gap of width 2 b is closed. It is the play operator of half-width b.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units};
 use crate::operators::play;
 
@@ -21,6 +22,11 @@ impl Backlash {
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["direction"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// Half-widths between a ten-thousandth and a fifth of the span.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {

@@ -4,6 +4,7 @@
 //! its own past (an autoregressive process), and on nothing else. It is looked for last, when nothing else
 //! explains the residual.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Finding, Quantity, Stage, Units};
 
 /// The noise is autoregressive: `e(k) = sum_i a_i e(k-i) + w(k)`, w white.
@@ -25,6 +26,11 @@ impl ColouredNoise {
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["whiteness"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = true;
 }
 
 impl Finding for ColouredNoise {

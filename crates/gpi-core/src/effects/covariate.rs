@@ -6,6 +6,7 @@
 //!
 //! A column that only repeats an input is not proposed.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
 use crate::Record;
 
@@ -36,6 +37,11 @@ impl Covariate {
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::Unique;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &[];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let shortest = 1.0 / situation.record.rate();

@@ -8,6 +8,7 @@
 //! L_i = (1 - z_i) q^-1 / (1 - z_i q^-1),      z_i = exp(-Ts / T_i).
 //! ```
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Coefficients, ParallelSections, Proposal, Quantity, Situation, Stage, Units};
 
 /// The output relaxes after the fast motion: `y += sum_i c_i L_i v` with first-order lags L_i of unit gain.
@@ -44,6 +45,12 @@ impl Creep {
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::HidesInSlowPoles;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Rests;
+    pub(super) const SHOWN_BY: &'static [&'static str] =
+        &["past-input", "past-intermediate", "trend"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// One, two and three lags between the shortest time constant and the record's length.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {

@@ -3,6 +3,7 @@
 //! `u_d(t) = u(t - T)`, (E1) in the documentation's theory. u is linearly interpolated between samples: with
 //! `T = (n + f)` samples, n whole and `0 <= f < 1`, `u_d(k) = (1 - f) u(k - n) + f u(k - n - 1)`.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, InputStage, Proposal, Quantity, Situation, Stage, Units};
 
 /// The drive is the input of T seconds before: `u_d(t) = u(t - T)`.
@@ -23,6 +24,11 @@ impl Delay {
     pub(super) const STAGE: Stage = Stage::Input;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Contained;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["past-input"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let delays =

@@ -3,6 +3,7 @@
 //! `y += d(t)`, (E11) in the documentation's theory; d is a smooth curve through evenly spaced knots (see
 //! `knots`). Its first value is 0, because the model has an offset.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units, knots};
 
 /// The output drifts: `y += d(t)` with a smooth curve d through knots.
@@ -27,6 +28,11 @@ impl Drift {
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::SlowInTime;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Rests;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["mean", "trend"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let duration = situation.duration();

@@ -3,6 +3,7 @@
 //! `y = x (1 + g(t))`, (E9) in the documentation's theory; g is a smooth curve through evenly spaced knots
 //! (see `knots`). Its first value is 0, because the play weights hold the gain at the start.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{
     Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units, knots,
 };
@@ -24,6 +25,11 @@ impl GainDrift {
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::SlowInTime;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Rests;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["trend"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let duration = situation.duration();

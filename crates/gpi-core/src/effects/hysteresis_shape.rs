@@ -15,6 +15,7 @@
 //! thresholds. Their minor loops change with the place; with q = 0 the hysteresis is the declared one. The
 //! integral of `P_a` from -1 is `(P_{a+1} - P_{a-1}) / (2 a + 1)`.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, PlayCurves, Proposal, Quantity, Situation, Stage, Units};
 
 /// Plays F are read through curves: `v = sum_i p_i (F_i + s q((F_i - m) / s, r_i))`, where dq/df is a sum of
@@ -45,6 +46,11 @@ impl HysteresisShape {
     pub(super) const STAGE: Stage = Stage::Plays;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::ShapeOfCycle;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["direction"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         /// A and B.

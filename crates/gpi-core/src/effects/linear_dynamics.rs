@@ -7,6 +7,7 @@
 //! the natural frequency `|s| / 2 pi` and the damping `-Re s / |s|`, real poles give time constants `-1/s`;
 //! the static gain is `(b1 + b2) / (1 + a1 + a2)`.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Coefficients, ParallelSections, Proposal, Quantity, Situation, Stage, Units};
 
 /// One more mode or two real poles in parallel with G: `(b1 q^-1 + b2 q^-2) / (1 + a1 q^-1 + a2 q^-2)`.
@@ -30,6 +31,11 @@ impl LinearDynamics {
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::ShapeOfCycle;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::JoinsG;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["past-input", "past-intermediate"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// Lightly damped modes between ten periods a record and close to half the sampling rate.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {

@@ -116,7 +116,7 @@ mod tests {
     use crate::chain::hysteresis::{Derivatives, Parameters};
     use crate::chain::looped::{model, record, run};
     use crate::chain::point::{DynamicsFreedom, Freedom};
-    use crate::explain::score::Base;
+    use crate::explain::base::Base;
     use crate::fit::preparation::Prepared;
     use crate::optimize::Loss;
 

@@ -23,6 +23,7 @@ mod outliers;
 mod output_nonlinearity;
 mod periodic_disturbance;
 mod place;
+mod properties;
 mod proposal;
 mod quantity;
 mod rate_dependence;
@@ -48,6 +49,7 @@ pub use place::{
     Added, ClosedLoops, Coefficients, Finding, InputStage, Moment, OutputStage, ParallelSections,
     Place, PlaceMut, PlayCurves, PlayWidths, Slope, Stage,
 };
+pub use properties::{FreeOrder, SeparatedBy, Signature};
 pub use quantity::{Quantity, Units};
 pub use rate_dependence::{RateDependence, SpeedLaw};
 pub use stiffness::Stiffness;
@@ -96,6 +98,11 @@ macro_rules! catalogue {
                 stage: $effect::STAGE,
                 driven: $effect::DRIVEN,
                 repeats: $effect::REPEATS,
+                signature: $effect::SIGNATURE,
+                free_order: $effect::FREE_ORDER,
+                separated_by: $effect::SEPARATED_BY,
+                shown_by: $effect::SHOWN_BY,
+                explains_autocorrelation: $effect::EXPLAINS_AUTOCORRELATION,
                 proposals: proposals!($effect: $place),
             };
         })*
@@ -147,6 +154,16 @@ pub struct Entry {
     pub driven: bool,
     /// Whether a model may have it more than once: two lines, two columns, a finer function of time.
     pub repeats: bool,
+    /// How surely a residual tells it from a bad fit.
+    pub signature: Signature,
+    /// How it relates to linear dynamics of free order.
+    pub free_order: FreeOrder,
+    /// Which experiment separates it from the effects that look like it.
+    pub separated_by: SeparatedBy,
+    /// Names of the residual tests that point to it.
+    pub shown_by: &'static [&'static str],
+    /// Whether a residual's autocorrelation is explained once it is found.
+    pub explains_autocorrelation: bool,
     /// The blocks that the search tries on a base model; none of a finding.
     pub(crate) proposals: fn(&Situation) -> Vec<Proposal<Effect>>,
 }

@@ -3,6 +3,7 @@
 //! Samples that differ from their neighbours by far more than the noise, (E14) in the documentation's theory.
 //! The fit limits their influence by Huber's loss; here they are only counted.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Finding, Quantity, Stage, Units};
 
 /// Isolated samples that differ from their neighbours by far more than the noise.
@@ -22,6 +23,11 @@ impl Outliers {
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::Shared;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["outliers"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 }
 
 impl Finding for Outliers {

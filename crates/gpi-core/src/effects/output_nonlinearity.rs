@@ -4,6 +4,7 @@
 //! m_0 and half the span s of the displacement x. There is no term of degree 1, because the play weights hold
 //! that gain.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units};
 
 /// The reading is a polynomial of the displacement: `y = x + s sum_m c_m ((x - m_0) / s)^m`, m = 2, 3, ..
@@ -25,6 +26,11 @@ impl OutputNonlinearity {
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::ShapeOfCycle;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["level"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let block = |output, terms: usize| {

@@ -3,6 +3,7 @@
 //! `y += a cos(2 pi f t) + b sin(2 pi f t)`, (E12) in the documentation's theory. The sinusoid
 //! `A cos(2 pi f t + phi)` has `a = A cos phi` and `b = -A sin phi`.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
 use crate::spectrum::{Strongest, near, peak, power};
 
@@ -33,6 +34,11 @@ impl PeriodicDisturbance {
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::Unique;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["lines"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     /// The line of the residual's spectrum with the largest ratio to its neighbours.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {

@@ -8,6 +8,7 @@
 //! `g(s) = s_0 ((1 + s/s_0)^e - 1) / e`. Its slope at s = 0 is 1; beyond the knee s_0 it grows more slowly.
 //! The law sees s through a first-order lag.
 
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, PlayWidths, Proposal, Quantity, Situation, Stage, Units};
 
 /// Half-widths grow with the speed s of the drive: `r (1 + a g(s)) + b g(s)`.
@@ -56,6 +57,11 @@ impl RateDependence {
     pub(super) const STAGE: Stage = Stage::Plays;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::ShapeOfCycle;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["speed"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         /// Exponents, and knees over the median speed.

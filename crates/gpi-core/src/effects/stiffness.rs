@@ -16,6 +16,7 @@
 //! the largest element of S and T (powers) or the widest half-width and the last weight (stops) are held.
 
 use super::loop_signals::{LoopSignal, Shape, families};
+use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{
     Block, ClosedLoops, InnerLoop, Law, Proposal, Quantity, Sees, Situation, Stage, Units,
 };
@@ -34,6 +35,11 @@ impl Stiffness {
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;
+    pub(super) const SIGNATURE: Signature = Signature::ShapeOfCycle;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["amplitude", "level-to-level"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         // a first-order lag has no resonance

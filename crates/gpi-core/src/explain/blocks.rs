@@ -1,32 +1,30 @@
 //! Blocks of time that are kept for the test.
 
+use super::policy::HoldoutPolicy;
 use crate::{Error, Experiment, Record};
 use std::ops::Range;
 
-/// The record with every fifth part of its time held out, in blocks spread over each experiment.
+/// The record with a part of its time held out, in blocks spread over each experiment.
 ///
-/// Blocks, not single samples: neighbours share their noise's colour. The first tenth is kept for the
-/// fit, which has to find the start.
-pub(crate) fn hold_out(record: &Record) -> Result<Record, Error> {
-    /// Blocks of an experiment, and the part of each stretch that is held out.
-    const BLOCKS: usize = 10;
-    const FRACTION: f64 = 0.2;
+/// Blocks and not single samples are held out, because noise correlates neighbouring samples.
+pub(super) fn hold_out(record: &Record, policy: &HoldoutPolicy) -> Result<Record, Error> {
+    let HoldoutPolicy { blocks, fraction, lead, places } = *policy;
     let split = |experiment: &Experiment| -> Vec<Range<usize>> {
         let rows = experiment.input.nrows();
-        let first = experiment.warmup + (rows - experiment.warmup) / 10;
-        let stretch = (rows - first) as f64 / BLOCKS as f64;
+        let first = experiment.warmup + (lead * (rows - experiment.warmup) as f64) as usize;
+        let stretch = (rows - first) as f64 / blocks as f64;
         let extremes = extremes(experiment);
         let block = |i: usize| {
             // in the middle of its stretch, so that slow effects are known on both sides
             let at = |place: f64| {
-                let start = first as f64 + stretch * (i as f64 + place * (1.0 - FRACTION));
-                start as usize..(start + FRACTION * stretch) as usize
+                let start = first as f64 + stretch * (i as f64 + place * (1.0 - fraction));
+                start as usize..(start + fraction * stretch) as usize
             };
-            let places = [0.5, 0.2, 0.8, 0.35, 0.65].map(at);
+            let places = places.map(at);
             let reaches = |block: &Range<usize>| extremes.iter().any(|k| block.contains(k));
             places.iter().find(|block| !reaches(block)).unwrap_or(&places[0]).clone()
         };
-        (0..BLOCKS).map(block).filter(|block| !block.is_empty()).collect()
+        (0..blocks).map(block).filter(|block| !block.is_empty()).collect()
     };
     let training = record.experiments().iter().map(|experiment| {
         let mut training = experiment.clone();
@@ -36,7 +34,7 @@ pub(crate) fn hold_out(record: &Record) -> Result<Record, Error> {
     record.with_experiments(training.collect())
 }
 
-/// Where every input is largest, smallest and fastest: a model is not asked for what it has not seen.
+/// Where every input is largest, smallest and fastest: a model is not tested outside the range it was fitted on.
 fn extremes(experiment: &Experiment) -> Vec<usize> {
     let mut places = Vec::new();
     for column in experiment.input.column_iter() {
@@ -49,7 +47,7 @@ fn extremes(experiment: &Experiment) -> Vec<usize> {
 }
 
 /// The record in which what is held out is scored, and nothing else.
-pub(crate) fn complement(training: &Record) -> Result<Record, Error> {
+pub(super) fn complement(training: &Record) -> Result<Record, Error> {
     let test = training.experiments().iter().map(|experiment| {
         let mut test = experiment.clone();
         test.warmup = experiment.held_out.first().map_or(0, |held| held.start);

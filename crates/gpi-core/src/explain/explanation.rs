@@ -1,10 +1,11 @@
-//! What was found, in words and numbers.
+//! The result of a search, as the user sees it.
 
+use super::moved_resonance::Resonance;
 use super::noise;
-use super::residual;
-use super::search::{Round, Search};
+use super::residual::{self, ResidualTest};
+use super::setup::SearchSetup;
+use super::state::{Addition, Rejected, SearchState};
 use super::verdict::{self, NextExperiment, Verdict};
-use super::{Rejected, ResidualTest, Resonance};
 use crate::chain::point::Point;
 use crate::effects::Effect;
 use crate::identify::residuals_from_fitted_start;
@@ -17,7 +18,7 @@ use std::ops::Range;
 pub struct Step {
     /// The effect; `None` for the declared model.
     pub effect: Option<&'static str>,
-    /// What the effect's parameters came to when all was refined: names, values and standard deviations.
+    /// The effect's parameters after the last refinement: names, values and standard deviations.
     pub parameters: Vec<Parameter>,
     /// The unit of each parameter, empty for a pure number.
     pub units: Vec<String>,
@@ -25,7 +26,7 @@ pub struct Step {
     pub promised: f64,
     /// Twice the rise of the log-likelihood: `N ln(squares before / squares after)`.
     pub deviance: f64,
-    /// What chance alone would give at most, with as many parameters and the residual's own colour.
+    /// The significance threshold of the deviance, for as many parameters and the residual's autocorrelation.
     pub chance: f64,
     /// Effects that this one made superfluous.
     pub dropped: Vec<&'static str>,
@@ -57,7 +58,7 @@ pub struct Explanation {
     pub effects: Vec<&'static str>,
     /// The declared model, then every effect that was added.
     pub steps: Vec<Step>,
-    /// The model as each step found it; all is refined together at last.
+    /// The model as each step found it. The last refinement changes all of it.
     pub models: Vec<Model>,
     /// Effects that were tried and not taken.
     pub rejected: Vec<Rejected>,
@@ -65,14 +66,14 @@ pub struct Explanation {
     pub before: Errors,
     /// Errors with all effects; isolated wrong samples that were found are not scored.
     pub after: Errors,
-    /// Tests of what is left.
+    /// Tests of the residual.
     pub tests: Vec<ResidualTest>,
-    /// A resonance that is elsewhere where the outputs swing more, with the smallest swing and with the largest:
-    /// where loops were closed around G, what rules out that the input's side alone is wrong.
+    /// A resonance whose frequency depends on the outputs' amplitude, at the smallest and at the largest amplitude.
+    /// Where loops were closed around G, it rules out that something in front of G is the only cause.
     pub moved_resonance: Option<[Resonance; 2]>,
-    /// What it comes to.
+    /// How far the record is explained.
     pub verdict: Verdict,
-    /// What to measure next, when that would tell more.
+    /// What to measure next, where that would show more.
     pub next_experiment: Option<NextExperiment>,
     /// Isolated wrong samples, which are not scored: rows of each output, in each experiment.
     pub wrong_samples: Vec<Vec<Vec<usize>>>,
@@ -88,26 +89,26 @@ pub struct Explanation {
     pub interrupted: bool,
 }
 
-/// Puts everything into words and numbers.
+/// Collects what was found.
 pub(super) fn summarise(
     record: &Record,
     holdout: Option<&Record>,
     base: &Point,
-    search: Search,
+    state: SearchState,
     refinement: Refinement,
     interrupted: bool,
 ) -> Result<Explanation, Error> {
-    let (mended, measured) = (&search.prepared.record, &search.measured);
-    let means = &search.prepared.means;
+    let (mended, measured) = (&state.prepared.record, &state.setup.measured);
+    let means = &state.prepared.means;
     let (residuals_before, residuals_after) =
-        (base.residuals(measured)?, search.point.residuals(mended)?);
+        (base.residuals(measured)?, state.point.residuals(mended)?);
     let base = base.to_model(record, mended, means)?;
-    let mut model = search.point.to_model(record, mended, means)?;
+    let mut model = state.point.to_model(record, mended, means)?;
     let errors = |record: &Record, model: &Model, residuals: &[Matrix]| -> Result<Errors, Error> {
         let train = SimulationError::of(record, residuals, false);
         let test = match holdout {
             Some(other) => on_another(model, other)?,
-            None => SimulationError::of(&search.test, residuals, false),
+            None => SimulationError::of(&state.setup.test, residuals, false),
         };
         Ok(Errors { train, holdout: test })
     };
@@ -115,18 +116,18 @@ pub(super) fn summarise(
     let after = errors(mended, &model, &residuals_after)?;
     let tests = residual::tests_of(&model, mended, &residuals_after)?;
     let noise: Vec<Effect> =
-        noise::effects(&search, &residuals_after, &tests, &refinement.noise_floor)?
+        noise::effects(&state, &residuals_after, &tests, &refinement.noise_floor)?
             .into_iter()
-            .filter(|effect| search.allowed.iter().any(|entry| entry.name == effect.name()))
+            .filter(|effect| state.setup.allowed.iter().any(|entry| entry.name == effect.name()))
             .collect();
-    let values = search.prepared.values();
+    let values = state.prepared.values();
     let mut steps = vec![declared(&before)];
-    steps.extend(search.rounds.iter().map(|round| added(round, &search, values)));
+    steps.extend(state.additions.iter().map(|one| added(one, state.setup, values)));
     steps.extend(noise.iter().map(|effect| of_noise(effect, &after)));
-    describe(&mut steps, &search.point, &refinement, &noise, &model)?;
-    let found = |round: &Round| round.trial.point.to_model(record, mended, means);
+    describe(&mut steps, &state.point, &refinement, &noise, &model)?;
+    let found = |one: &Addition| one.trial.point.to_model(record, mended, means);
     let mut models = vec![base.clone()];
-    models.extend(search.rounds.iter().map(found).collect::<Result<Vec<_>, _>>()?);
+    models.extend(state.additions.iter().map(found).collect::<Result<Vec<_>, _>>()?);
     let mut effects: Vec<&'static str> = Vec::new();
     for name in steps.iter().filter(|s| !s.parameters.is_empty()).filter_map(|s| s.effect) {
         if !effects.contains(&name) {
@@ -137,14 +138,16 @@ pub(super) fn summarise(
     all.extend(noise);
     model = model.with_effects(all)?;
     models.resize(steps.len(), model.clone());
-    let mut rejected = search.last.clone();
-    rejected.extend(search.rounds.iter().flat_map(|round| round.others.iter().cloned()));
+    let mut rejected = state.last.clone();
+    rejected.extend(state.additions.iter().flat_map(|one| one.others.iter().cloned()));
     rejected.retain(|one| !effects.contains(&one.effect));
     let verdict = verdict::verdict(&effects, &tests);
+    let policy = &state.setup.policy.proposal;
+    let next = verdict::next_experiment(&rejected, &effects, &tests, verdict, record, policy);
     Ok(Explanation {
-        next_experiment: verdict::next_experiment(&rejected, &effects, &tests, verdict, record),
+        next_experiment: next,
         held_out: mended.experiments().iter().map(|e| e.held_out.clone()).collect(),
-        wrong_samples: search.wrong.clone(),
+        wrong_samples: state.wrong.clone(),
         warmups: mended.experiments().iter().map(|e| e.warmup).collect(),
         base,
         model,
@@ -164,7 +167,7 @@ pub(super) fn summarise(
     })
 }
 
-/// The error on another experiment, without effects that are others there.
+/// The error on another experiment, without effects that the input does not drive: they differ there.
 fn on_another(model: &Model, record: &Record) -> Result<SimulationError, Error> {
     let driven = model.effects().iter().filter(|effect| effect.entry().driven).cloned();
     let model = model.clone().with_effects(driven.collect())?;
@@ -186,18 +189,18 @@ fn declared(before: &Errors) -> Step {
     }
 }
 
-fn added(round: &Round, search: &Search, values: f64) -> Step {
-    let trial = &round.trial;
+fn added(addition: &Addition, setup: &SearchSetup, values: f64) -> Step {
+    let trial = &addition.trial;
     Step {
         effect: Some(trial.entry.name),
         parameters: Vec::new(),
         units: Vec::new(),
         promised: trial.promised,
         deviance: trial.deviance,
-        chance: trial.chance,
-        dropped: round.dropped.clone(),
+        chance: trial.threshold,
+        dropped: addition.dropped.clone(),
         train_rms: (trial.cost / values).sqrt(),
-        holdout_rms: search.holdout_rms(&trial.held_out),
+        holdout_rms: setup.holdout_rms(&trial.held_out),
     }
 }
 
@@ -210,7 +213,7 @@ fn of_noise(effect: &Effect, after: &Errors) -> Step {
     }
 }
 
-/// Fills in what the parameters of the effects came to.
+/// Fills in the effects' parameters.
 fn describe(
     steps: &mut [Step],
     point: &Point,

@@ -1,13 +1,22 @@
-//! Half-widths and thresholds that the residual asks for.
+//! Finer grids: half-widths and thresholds that the residual asks for.
+//!
+//! What the declared model itself can explain is no effect. Each play or deadzone that is tried has one column, the
+//! change of the output by its weight. The columns are projected off the model's sensitivities ([`Projection`]) and
+//! taken one after the other (orthogonal matching pursuit): the one that takes most of the squares, `s_i^2 / L_ii`,
+//! comes first, and is then projected off the others, `L -= L_i L_i' / L_ii` and `s -= s_i L_i / L_ii`.
 
-use super::projection::{LEFT, Projection};
-use super::score::Base;
+use super::base::Base;
+use super::policy::GridPolicy;
+use super::policy::score::LEFT;
+use super::projection::Projection;
+use super::setup::SearchSetup;
+use super::state::SearchState;
 use crate::chain::bounds::range;
 use crate::chain::free_run::Signals;
 use crate::chain::point::Point;
 use crate::effects::Stage;
-use crate::fit::preparation::Prepared;
-use crate::fit::refine::RefineOptions;
+use crate::fit::minimize::FitOptions;
+use crate::progress::{Progress, report};
 use crate::{Error, Experiment, Matrix};
 use nalgebra::DVector;
 
@@ -27,32 +36,77 @@ impl Place {
     }
 }
 
-/// The base point with those plays and deadzones more, without weight yet, that would take most of the
-/// residual, each after the others (orthogonal matching pursuit); how many they are.
-pub(crate) fn enriched(
-    base: &Base,
-    prepared: &Prepared,
-    moving: &RefineOptions,
-) -> Result<(Point, usize), Error> {
-    /// At once.
-    const MOST: usize = 8;
-    /// Of the residual's squares: less is not worth a play.
-    const LEAST: f64 = 1e-3;
-    /// A weight beside which the output changes linearly.
-    const PROBE: f64 = 1e-4;
-    let places = places(base, prepared, moving);
+/// Moves half-widths and thresholds, and takes finer grids as long as they pay. Says whether the model became better.
+pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    let policy = &state.setup.policy.grid;
+    state.is_rich = true;
+    if !state.setup.moving.half_widths && !state.setup.moving.thresholds {
+        return Ok(false);
+    }
+    let values = state.prepared.values();
+    let mut gained = false;
+    for round in 0..policy.rounds {
+        report(progress, "finer grid", round as f64 / policy.rounds as f64)?;
+        let (point, added) = enriched(state)?;
+        if added == 0 && round > 0 {
+            break;
+        }
+        let (point, cost) = on_moving_grids(state, point, progress)?;
+        let deviance = values * (state.cost / cost.max(f64::MIN_POSITIVE)).ln();
+        // two numbers of a play, priced as in the BIC
+        if deviance < 2.0 * added as f64 * values.ln() {
+            break;
+        }
+        (state.point, state.cost) = (point, cost);
+        gained = true;
+        if deviance < policy.small * values {
+            break;
+        }
+    }
+    Ok(gained)
+}
+
+/// A point fitted with grids that move, plays and deadzones without use left out; and its squares.
+fn on_moving_grids(
+    state: &SearchState,
+    point: Point,
+    progress: Progress,
+) -> Result<(Point, f64), Error> {
+    let policy = &state.setup.policy.grid;
+    let still =
+        FitOptions { steps: policy.held_steps, gain: policy.gain, ..state.setup.options.clone() };
+    let point = state.fit(point, &still, "refinement", progress)?.point;
+    let mut options = FitOptions { steps: policy.moving_steps, ..state.setup.moving_grids.clone() };
+    let mut fitted = state.fit(point, &options, "refinement", progress)?;
+    if fitted.point.drop_unused() {
+        options.steps = policy.moving_steps / 3;
+        fitted = state.fit(fitted.point, &options, "refinement", progress)?;
+    }
+    Ok((fitted.point, fitted.linearization.cost))
+}
+
+/// The point with those plays and deadzones more, without weight yet, that would take most of the residual; how many
+/// they are.
+fn enriched(state: &SearchState) -> Result<(Point, usize), Error> {
+    let policy = &state.setup.policy.grid;
+    let SearchState { point, prepared, .. } = state;
+    let record = &prepared.record;
+    let base = Base::new(point, record, state.setup.options.freedom, &state.setup.options.loss)?;
+    let places = places(&base, &prepared.spans(point), state.setup);
     let columns = |known: &Signals, here: &Matrix, experiment: &Experiment, index: usize| {
         let column = |place: &Place| {
-            let point = place.added_to(base.point, PROBE);
+            let point = place.added_to(base.point, policy.probe);
             Ok(point.output_from(Stage::Plays, known, experiment, index)? - here)
         };
         places.iter().map(column).collect()
     };
     let Projection { mut left, mut score, squares, cost } = base.project(places.len(), &columns)?;
-    let chance = (2.0 * prepared.values().ln() / prepared.values()).max(LEAST) * cost;
-    let mut point = base.point.clone();
+    let values = prepared.values();
+    // two numbers of a play, priced as in the BIC
+    let least = (2.0 * values.ln() / values).max(policy.least) * cost;
+    let mut point = point.clone();
     let mut added = 0;
-    while added < MOST {
+    while added < policy.at_once {
         let usable = |&i: &usize| {
             // a play's weight is not negative
             let sign = matches!(places[i], Place::Deadzone { .. }) || score[i] > 0.0;
@@ -60,7 +114,7 @@ pub(crate) fn enriched(
         };
         let gain = |i: usize| score[i] * score[i] / left[(i, i)];
         let best = (0..places.len()).filter(usable).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
-        let Some(best) = best.filter(|&i| gain(i) > chance) else { break };
+        let Some(best) = best.filter(|&i| gain(i) > least) else { break };
         point = places[best].added_to(&point, 0.0);
         added += 1;
         deflate(&mut left, &mut score, best);
@@ -77,21 +131,21 @@ fn deflate(left: &mut Matrix, score: &mut DVector<f64>, taken: usize) {
 }
 
 /// Where plays and deadzones may come: dense where half-widths are small.
-fn places(base: &Base, prepared: &Prepared, moving: &RefineOptions) -> Vec<Place> {
-    const PLAYS: usize = 40;
-    const DEADZONES: usize = 32;
-    let spans = prepared.spans(base.point);
+fn places(base: &Base, spans: &[f64], setup: &SearchSetup) -> Vec<Place> {
+    let GridPolicy { tried_plays, tried_deadzones, density, near_zero, .. } = setup.policy.grid;
     let mut places = Vec::new();
-    for (input, span) in spans.into_iter().enumerate() {
-        if moving.half_widths {
-            let half_width = |i: usize| 0.5 * span * (i as f64 / PLAYS as f64).powf(1.5);
-            places.extend((1..=PLAYS).map(|i| Place::Play { input, half_width: half_width(i) }));
+    for (input, span) in spans.iter().enumerate() {
+        if setup.moving.half_widths {
+            let half_width = |i: usize| 0.5 * span * (i as f64 / tried_plays as f64).powf(density);
+            let place = |i| Place::Play { input, half_width: half_width(i) };
+            places.extend((1..=tried_plays).map(place));
         }
-        if moving.thresholds {
+        if setup.moving.thresholds {
             let (low, high) = range(base.record, input);
-            let step = (high - low) / (DEADZONES + 1) as f64;
+            let step = (high - low) / (tried_deadzones + 1) as f64;
             let threshold = |i: usize| low + i as f64 * step;
-            let nonzero = (1..=DEADZONES).map(threshold).filter(|&eta| eta.abs() > 0.1 * step);
+            let is_apart = |eta: &f64| eta.abs() > near_zero * step;
+            let nonzero = (1..=tried_deadzones).map(threshold).filter(is_apart);
             places.extend(nonzero.map(|threshold| Place::Deadzone { input, threshold }));
         }
     }

@@ -1,43 +1,56 @@
-//! Closing the loop: residual, missing effect, before and after.
+//! Which effects of the catalogue a record's model lacks.
 //!
-//! 1. The declared model (deadzones, plays, G) is identified on the training data: the record without ten
-//!    blocks of time. G is kept from poles that would follow creep or a disturbance.
-//! 2. Every candidate of the catalogue is ranked by a score test: the output's change with the effect,
-//!    projected off the model's own sensitivities, takes a part of the residual.
-//! 3. The best few are fitted jointly with the whole model. The one that explains most stays if it gains
-//!    more than chance, and if the held-out blocks confirm it; effects that it makes superfluous go.
-//! 4. Back to 2 until nothing is confirmed; then what the input drives takes the place of a slow function
-//!    of time that it explains as well, and the residual is tested for what is left.
+//! 1. The declared model (deadzones, plays, G) is identified on the training data: the record without ten blocks of
+//!    time ([`blocks`]). G gets no poles that would follow creep or a disturbance.
+//! 2. Every candidate of the catalogue is ranked by a score test ([`score`]): the change of the output by the effect,
+//!    projected off the model's own sensitivities ([`projection`]), explains a part of the residual.
+//! 3. The best few are fitted jointly with the whole model ([`trial`]). The one that explains most is accepted if it is
+//!    significant and the held-out blocks confirm it ([`judgement`]). Effects that it makes superfluous are dropped
+//!    ([`revision`]).
+//! 4. Steps 2 and 3 are repeated until no effect is accepted. Then an effect that the input drives replaces a slow
+//!    function of time that it explains as well, and the residual is tested for remaining structure ([`residual`]).
+//!
+//! The files import in one direction only: [`policy`] (every tolerance), [`judgement`], [`base`], [`projection`],
+//! [`score`], [`setup`] (what never changes), [`state`] (where the search stands), [`ranking`], [`trial`], [`grid`],
+//! [`revision`], [`search`], [`explanation`].
 
+pub(crate) mod base;
 mod blocks;
 mod concurrently;
 mod explanation;
 mod grid;
-mod lags;
+mod judgement;
 mod moved_resonance;
 mod noise;
+mod policy;
 mod projection;
 mod ranking;
+mod repair;
 mod residual;
 mod revision;
-pub(crate) mod score;
+mod score;
 mod search;
+mod settings;
+mod setup;
+mod state;
 mod trial;
 mod verdict;
 
-use crate::fit::minimize::fit;
 use crate::fit::preparation::starts_at_rest;
 use crate::fit::refine::{RefineOptions, Refined, settings};
 use crate::identify::procedure::{compare, prepare};
 use crate::identify::{Grid, IdentifyOptions, Progress, Refinement};
 use crate::spectrum::is_one_sine;
+use crate::uncertainty::outliers;
 use crate::{Error, Matrix, Record};
 use explanation::summarise;
 pub use explanation::{Errors, Explanation, Step};
 pub use moved_resonance::Resonance;
+use policy::{FitPolicy, GridPolicy, SearchPolicy};
 pub use residual::{ResidualOptions, ResidualTest, residual_tests};
-use search::Search;
-pub use trial::Rejected;
+use setup::SearchSetup;
+pub use state::Rejected;
+use state::SearchState;
 pub use verdict::{NextExperiment, Verdict, structured};
 
 /// What an explanation may use.
@@ -76,16 +89,17 @@ pub fn explain(
     options: &ExplainOptions,
     progress: Progress,
 ) -> Result<Explanation, Error> {
-    let allowed = search::allowed("effects", options.effects.as_deref())?;
-    let required = search::allowed("require", Some(&options.require))?;
+    let policy = SearchPolicy::default();
+    policy.validate()?;
+    let allowed = setup::allowed("effects", options.effects.as_deref())?;
+    let required = setup::allowed("require", Some(&options.require))?;
     record.require_moving()?;
-    let training = blocks::hold_out(record)?;
-    let identify = usual_grids(&options.identify, &training);
-    // Spikes that stand out of the output itself.
+    let training = blocks::hold_out(record, &policy.holdout)?;
+    let identify = usual_grids(&options.identify, &training, &policy.grid);
+    // spikes of the output itself
     let outputs: Vec<Matrix> = training.experiments().iter().map(|e| e.output.clone()).collect();
-    let spikes =
-        crate::uncertainty::outliers::places(&outputs, &revision::everything(&training)?, 0);
-    let training = revision::repaired(&training, &outputs, &spikes)?;
+    let spikes = outliers::places(&outputs, &repair::everything(&training)?, 0);
+    let training = repair::repaired(&training, &outputs, &spikes)?;
     let mut prepared = prepare(&training, &identify)?;
     let measured = as_measured(&prepared.record, record, &prepared.means)?;
     let mut refined = compare(&mut prepared, &identify, true, progress)?.refined;
@@ -99,24 +113,31 @@ pub fn explain(
         half_widths: !given(&identify.half_widths),
         ..RefineOptions::default()
     };
-    let mut search = Search::new(prepared, &refined, allowed, order_is_given, measured, moving)?;
-    search.repair()?;
-    let mut interrupted = is_interrupted(search.run(progress))?;
-    search.settle_lags()?;
+    let weights = &refined.options.loss.scales;
+    let setup =
+        SearchSetup::new(&prepared, weights, measured, allowed, order_is_given, moving, policy)?;
+    let mut state = SearchState::new(&setup, prepared, &refined);
+    state.repair()?;
+    let mut interrupted = is_interrupted(search::run(&mut state, progress))?;
+    revision::settle_lags(&mut state)?;
     for entry in required {
-        interrupted = interrupted || is_interrupted(search.force(entry, progress))?;
+        if !interrupted {
+            let forced = search::force(&mut state, entry, progress);
+            interrupted = is_interrupted(forced)?;
+        }
     }
     let mut patient = |_: &str, _: f64| true;
     let last: Progress = if interrupted { &mut patient } else { progress };
-    let refinement = finish(&mut search, interrupted, last)?;
-    // what rules out that the input's side alone is wrong
-    let is_inside = search.point.loops().next().is_some();
-    let moved_resonance = if is_inside && !interrupted {
-        moved_resonance::moved_resonance(&base, &search.prepared, &search.options, last)?
+    let refinement = finish(&mut state, interrupted, last)?;
+    // rules out that something in front of G is the only cause
+    let has_loops = state.point.loops().next().is_some();
+    let moved_resonance = if has_loops && !interrupted {
+        let policy = &setup.policy.resonance;
+        moved_resonance::moved_resonance(&base, &state.prepared, &setup.options, policy, last)?
     } else {
         None
     };
-    let found = summarise(record, holdout, &base, search, refinement, interrupted)?;
+    let found = summarise(record, holdout, &base, state, refinement, interrupted)?;
     Ok(Explanation { moved_resonance, ..found })
 }
 
@@ -129,18 +150,22 @@ fn is_interrupted(result: Result<(), Error>) -> Result<bool, Error> {
 }
 
 /// Grids that are rich enough for a base model and cheap enough for a search.
-fn usual_grids(options: &IdentifyOptions, training: &Record) -> IdentifyOptions {
+fn usual_grids(
+    options: &IdentifyOptions,
+    training: &Record,
+    policy: &GridPolicy,
+) -> IdentifyOptions {
     let robust = Some(false);
     if is_one_sine(training) {
         // One cycle cannot tell many plays apart: as few as it asks for.
         return IdentifyOptions { robust, ..options.clone() };
     }
-    // Where the past is unknown, many plays are needed to find it.
     let in_motion = |e: &crate::Experiment| e.warmup == 0 && !starts_at_rest(e);
-    let plays = if training.experiments().iter().any(in_motion) { 24 } else { 16 };
+    let is_in_motion = training.experiments().iter().any(in_motion);
+    let plays = if is_in_motion { policy.half_widths_in_motion } else { policy.half_widths };
     IdentifyOptions {
         half_widths: Some(options.half_widths.clone().unwrap_or(Grid::Count(plays))),
-        thresholds: Some(options.thresholds.clone().unwrap_or(Grid::Count(7))),
+        thresholds: Some(options.thresholds.clone().unwrap_or(Grid::Count(policy.thresholds))),
         robust,
         ..options.clone()
     }
@@ -158,34 +183,34 @@ fn as_measured(prepared: &Record, given: &Record, means: &[f64]) -> Result<Recor
     prepared.with_experiments(experiments)
 }
 
-/// Refines everything once more, grids that were not given included, and works out how sure it is.
-fn finish(search: &mut Search, interrupted: bool, progress: Progress) -> Result<Refinement, Error> {
-    const STEPS: usize = 15;
-    /// With the grids held.
-    const STILL: usize = 30;
-    /// Times the gain at which a refinement by itself would end: as much as chance gives one parameter.
-    const COARSER: f64 = 10.0;
+/// Refines everything once more, grids that were not given included, and estimates the parameters' uncertainty.
+fn finish(
+    state: &mut SearchState,
+    interrupted: bool,
+    progress: Progress,
+) -> Result<Refinement, Error> {
+    let setup = state.setup;
+    let FitPolicy { last_free_steps, last_held_steps, coarser, .. } = setup.policy.fits;
     let stage = |options: &RefineOptions, steps: usize| {
-        let mut own = settings(&search.prepared, options, steps);
-        own.loss.scales.clone_from(&search.options.loss.scales);
+        let mut own = settings(&state.prepared, options, steps);
+        own.loss.scales.clone_from(&setup.options.loss.scales);
         own
     };
-    let mut options = stage(&search.moving, if interrupted { 1 } else { STEPS });
-    options.gain *= COARSER;
-    let record = &search.prepared.record;
-    let mut fitted = fit(search.point.clone(), record, &options, "refinement", progress)?;
-    if !interrupted && (search.moving.thresholds || search.moving.half_widths) {
-        // with all that moves at once, the kinks at which plays turn end the fit before the rest has settled
-        let still = stage(&RefineOptions::default(), STILL);
+    let mut options = stage(&setup.moving, if interrupted { 1 } else { last_free_steps });
+    options.gain *= coarser;
+    let mut fitted = state.fit(state.point.clone(), &options, "refinement", progress)?;
+    if !interrupted && (setup.moving.thresholds || setup.moving.half_widths) {
+        // with everything free at once, the kinks at which plays turn end the fit before the rest has settled
+        let held = stage(&RefineOptions::default(), last_held_steps);
         let before = fitted.history;
-        let settled = fit(fitted.point, record, &still, "refinement", progress)?.after(&before);
-        fitted =
-            fit(settled.point, record, &options, "refinement", progress)?.after(&settled.history);
+        let settled = state.fit(fitted.point, &held, "refinement", progress)?.after(&before);
+        let again = state.fit(settled.point, &options, "refinement", progress)?;
+        fitted = again.after(&settled.history);
     }
-    search.point = fitted.point.clone();
-    search.repair()?;
+    state.point = fitted.point.clone();
+    state.repair()?;
     let refined = Refined { fitted, options, outliers: 0, robust: false };
-    let refinement = refined.finish(&search.prepared, progress)?;
-    search.point = refinement.bands.point.clone();
+    let refinement = refined.finish(&state.prepared, progress)?;
+    state.point = refinement.bands.point.clone();
     Ok(refinement)
 }

@@ -1,5 +1,6 @@
-//! A resonance that moves with the swing: nothing in front of G can do that.
+//! A resonance whose frequency depends on the output's amplitude: nothing in front of G can cause that.
 
+use super::policy::ResonancePolicy;
 use crate::Progress;
 use crate::chain::point::Point;
 use crate::fit::minimize::{FitOptions, fit};
@@ -10,7 +11,7 @@ use crate::linear::Section;
 use crate::{Error, Experiment, Record};
 use std::f64::consts::TAU;
 
-/// Where a resonance of the dynamics is at one swing.
+/// A resonance of the dynamics at one amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resonance {
     /// Root mean square of the outputs.
@@ -21,8 +22,8 @@ pub struct Resonance {
     pub deviation: f64,
 }
 
-/// The resonance that differs most surely between the experiments of smallest and largest swing, there and
-/// here; `None` where the swings are alike, or no resonance differs by more than chance.
+/// The resonance that differs most significantly between the experiments of smallest and largest amplitude, at the one
+/// and at the other; `None` where the amplitudes are alike, or no resonance differs significantly.
 ///
 /// The model without loops is fitted to each of the two experiments by itself. A hysteresis or any other
 /// effect on the input changes v, and with it the response; the poles of G stay where they are.
@@ -30,31 +31,29 @@ pub(super) fn moved_resonance(
     base: &Point,
     prepared: &Prepared,
     options: &FitOptions,
+    policy: &ResonancePolicy,
     progress: Progress,
 ) -> Result<Option<[Resonance; 2]>, Error> {
-    /// Largest over smallest swing.
-    const APART: f64 = 1.25;
-    /// Standard deviations by which a resonance must differ.
-    const SURE: f64 = 5.0;
     let record = &prepared.record;
     let swings: Vec<f64> = record.experiments().iter().map(swing).collect();
     let mut order: Vec<usize> = (0..swings.len()).collect();
     order.sort_by(|&a, &b| swings[a].total_cmp(&swings[b]));
     let (Some(&least), Some(&most)) = (order.first(), order.last()) else { return Ok(None) };
-    if swings[most] < APART * swings[least] {
+    if swings[most] < policy.apart * swings[least] {
         return Ok(None);
     }
-    let small = resonances(base, record, least, swings[least], options, progress)?;
-    let large = resonances(base, record, most, swings[most], options, progress)?;
+    let small = resonances(base, record, least, swings[least], options, policy, progress)?;
+    let large = resonances(base, record, most, swings[most], options, policy, progress)?;
     let sureness = |pair: &[Resonance; 2]| {
         let [a, b] = pair;
         (a.frequency - b.frequency).abs() / a.deviation.hypot(b.deviation)
     };
     let pairs = small.into_iter().zip(large).filter_map(|(a, b)| Some([a?, b?]));
     let surest = pairs.max_by(|a, b| sureness(a).total_cmp(&sureness(b)));
-    Ok(surest.filter(|pair| sureness(pair) > SURE))
+    Ok(surest.filter(|pair| sureness(pair) > policy.sure))
 }
 
+/// Amplitude (rms) of an experiment's outputs.
 fn swing(experiment: &Experiment) -> f64 {
     let values = experiment.scored() * experiment.output.ncols();
     let rows = experiment.scored_rows(&experiment.output);
@@ -68,14 +67,14 @@ fn resonances(
     experiment: usize,
     swing: f64,
     options: &FitOptions,
+    policy: &ResonancePolicy,
     progress: Progress,
 ) -> Result<Vec<Option<Resonance>>, Error> {
-    const STEPS: usize = 8;
     let whole = record.experiments()[experiment].clone();
     let one = Representatives { experiments: vec![(experiment, whole)], ratio: 1.0, memory: 0 };
     let (point, record) = one.alone(base, record)?;
-    let options = FitOptions { steps: STEPS, gain: 1e-4, ..options.clone() };
-    let fitted = fit(point, &record, &options, "dynamics at each swing", progress)?;
+    let options = FitOptions { steps: policy.steps, gain: policy.gain, ..options.clone() };
+    let fitted = fit(point, &record, &options, "dynamics at each amplitude", progress)?;
     let (point, table) = (fitted.point.clone(), fitted.table.clone());
     let refined = Refined { fitted, options, outliers: 0, robust: false };
     let uncertainty = refined.uncertainty(&record, progress)?;

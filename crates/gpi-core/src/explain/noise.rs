@@ -1,42 +1,41 @@
-//! Effects of the noise: isolated wrong samples, and memory.
+//! Effects of the noise: isolated wrong samples, and autocorrelation.
 
+use super::policy::NoisePolicy;
 use super::residual::{ResidualTest, STRUCTURE};
-use super::search::Search;
-use super::trial::LEAST;
+use super::state::SearchState;
 use crate::effects::{ColouredNoise, Effect, Outliers};
 use crate::identify::{NoiseFloor, NoiseMethod};
 use crate::uncertainty::noise_model::NoiseModel;
 use crate::{Error, Matrix, Record};
 
-/// What is wrong with the noise, when everything else is explained.
-pub(crate) fn effects(
-    search: &Search,
+/// What the noise is besides white, once everything else is explained.
+pub(super) fn effects(
+    state: &SearchState,
     residuals: &[Matrix],
     tests: &[ResidualTest],
     floor: &NoiseFloor,
 ) -> Result<Vec<Effect>, Error> {
     let mut found = Vec::new();
-    found.extend(outliers(search, residuals));
-    for output in 0..search.measured.outputs().len() {
+    found.extend(outliers(state, residuals));
+    for output in 0..state.setup.measured.outputs().len() {
         let fails = |test: &ResidualTest| {
             test.output == output && STRUCTURE.contains(&test.name) && !test.passed()
         };
         if !tests.iter().any(fails) {
-            found.extend(memory(search, residuals, output, floor)?);
+            found.extend(memory(state, residuals, output, floor)?);
         }
     }
     Ok(found)
 }
 
-/// The samples that were found wrong, by what they were changed.
-fn outliers(search: &Search, residuals: &[Matrix]) -> Option<Effect> {
-    /// Fewer may be chance, or the way a record was cut.
-    const FEWEST: usize = 3;
+/// The samples that were found wrong, and by how much they were changed.
+fn outliers(state: &SearchState, residuals: &[Matrix]) -> Option<Effect> {
+    let policy = &state.setup.policy.noise;
     let (mut count, mut driven, mut squares) = (0, 0, 0.0);
-    let measured = &search.measured;
-    let pairs = measured.experiments().iter().zip(search.prepared.record.experiments());
-    for ((given, mended), places) in pairs.zip(&search.wrong) {
-        let after_jumps = after_jumps(&given.input);
+    let measured = &state.setup.measured;
+    let pairs = measured.experiments().iter().zip(state.prepared.record.experiments());
+    for ((given, mended), places) in pairs.zip(&state.wrong) {
+        let after_jumps = after_jumps(&given.input, policy);
         for (output, places) in places.iter().enumerate() {
             for &k in places {
                 count += 1;
@@ -48,15 +47,15 @@ fn outliers(search: &Search, residuals: &[Matrix]) -> Option<Effect> {
     let samples = measured.samples();
     let size = (squares / count.max(1) as f64).sqrt();
     let left: f64 = residuals.iter().map(Matrix::norm_squared).sum();
-    // samples that stand apart where the input jumps are what the model makes of a jump
-    let stand_apart = count >= FEWEST && 2 * driven < count && squares > LEAST * (left + squares);
+    // where most follow a jump of the input, it is the model that errs at jumps
+    let stand_apart = count >= policy.fewest
+        && (driven as f64) < policy.after_jumps * count as f64
+        && squares > state.setup.policy.judgement.least * (left + squares);
     stand_apart.then(|| Outliers { count, samples, size }.into())
 }
 
-/// Whether an input jumped at a sample or up to seven before: by more than 99 % of its changes.
-fn after_jumps(input: &Matrix) -> Vec<bool> {
-    const SHORTLY: usize = 8;
-    const NEARLY_ALL: f64 = 0.99;
+/// Whether an input jumped at a sample or shortly before: by more than nearly all of its changes.
+fn after_jumps(input: &Matrix, policy: &NoisePolicy) -> Vec<bool> {
     let samples = input.nrows();
     let mut after = vec![false; samples];
     for column in input.column_iter() {
@@ -64,49 +63,40 @@ fn after_jumps(input: &Matrix) -> Vec<bool> {
         let mut changes: Vec<f64> = (1..samples).map(change).collect();
         changes.sort_by(f64::total_cmp);
         let last = changes.len().saturating_sub(1) as f64;
-        let Some(&usual) = changes.get((NEARLY_ALL * last) as usize) else { continue };
+        let Some(&usual) = changes.get((policy.no_jumps * last) as usize) else { continue };
         for k in (1..samples).filter(|&k| change(k) > usual) {
-            after[k..(k + SHORTLY).min(samples)].fill(true);
+            after[k..(k + policy.shortly).min(samples)].fill(true);
         }
     }
     after
 }
 
-/// Noise with memory, if its past predicts it: on the training data, and on what is held out; and if it is
-/// there when nothing moves, as far as the record shows that.
+/// Autocorrelated noise, if the residual's past predicts it on the training data and on what is held out, and if the
+/// noise is also there when nothing moves, as far as the record shows that.
 fn memory(
-    search: &Search,
+    state: &SearchState,
     residuals: &[Matrix],
     output: usize,
     floor: &NoiseFloor,
 ) -> Result<Option<Effect>, Error> {
-    /// A residual so many times larger than the noise at rest is the actuator's. Slow noise shows in part
-    /// only while the input rests.
-    const LOUDER: f64 = 2.5;
-    /// Where the input never rests, a residual of so large a part of the span is no sensor's noise.
-    const LOUD: f64 = 0.02;
-    /// The part by which the standard deviation must fall.
-    const FALL: f64 = 0.1;
-    /// Fourth moment over the square of the second: 3 for noise of any colour, more for what comes in bursts
-    /// as the actuator moves.
-    const BURSTS: f64 = 3.8;
-    let colour = NoiseModel::of(residuals, &search.prepared.record);
+    let policy = &state.setup.policy.noise;
+    let colour = NoiseModel::of(residuals, &state.prepared.record);
     let filter = &colour.coefficients[output];
     if filter.is_empty() {
         return Ok(None);
     }
-    let (own, innovation) = one_step(residuals, &search.prepared.record, output, filter);
-    let (held_out, predicted) = one_step(residuals, &search.test, output, filter);
-    let outputs = search.prepared.record.experiments().iter().map(|e| e.output.column(output));
+    let (own, innovation) = one_step(residuals, &state.prepared.record, output, filter);
+    let (held_out, predicted) = one_step(residuals, &state.setup.test, output, filter);
+    let outputs = state.prepared.record.experiments().iter().map(|e| e.output.column(output));
     let span = outputs.map(|column| column.max() - column.min()).fold(0.0, f64::max);
     let loudest = match floor.method {
-        NoiseMethod::HighFrequencyResidual => LOUD * span,
-        _ => LOUDER * floor.rms[output],
+        NoiseMethod::HighFrequencyResidual => policy.loud * span,
+        _ => policy.louder * floor.rms[output],
     };
-    if own > loudest || kurtosis(residuals, &search.prepared.record, output) > BURSTS {
+    if own > loudest || kurtosis(residuals, &state.prepared.record, output) > policy.kurtosis {
         return Ok(None);
     }
-    let falls = |before: f64, after: f64| after < (1.0 - FALL) * before;
+    let falls = |before: f64, after: f64| after < (1.0 - policy.predicted) * before;
     let block = ColouredNoise { output, coefficients: filter.clone(), innovation, deviation: own };
     Ok((falls(own, innovation) && falls(held_out, predicted)).then(|| block.into()))
 }
@@ -164,10 +154,11 @@ mod tests {
     #[test]
     fn samples_shortly_after_an_input_jumps_are_known() {
         let input = Matrix::from_fn(1000, 1, |k, _| if k < 400 { 0.0 } else { 5.0 });
-        let after = after_jumps(&input);
+        let policy = NoisePolicy::default();
+        let after = after_jumps(&input, &policy);
         let places: Vec<usize> = (0..1000).filter(|&k| after[k]).collect();
         assert_eq!(places, (400..408).collect::<Vec<_>>());
         // nothing moves: nothing jumps
-        assert!(!after_jumps(&Matrix::zeros(50, 2)).contains(&true));
+        assert!(!after_jumps(&Matrix::zeros(50, 2), &policy).contains(&true));
     }
 }

@@ -1,6 +1,15 @@
-//! Candidates' columns beside the model's own sensitivities: what the model could absorb does not count.
+//! Candidates' columns without what the model's own sensitivities can express.
+//!
+//! For columns C (one a probe, all scored samples of all outputs below each other), sensitivities J and weighted
+//! residual e, let Q = J W W' J' be the projection onto what the model can do (see [`Base`]). Then
+//!
+//! - `left = C' (I - Q) C = C' C - (W' J' C)' (W' J' C)`,
+//! - `score = C' (I - Q) e = C' e - (W' J' C)' (W' J' e)`,
+//! - `cost = e' (I - Q) e = e' e - |W' J' e|^2`, what a converged model would leave.
+//!
+//! J has millions of rows and is never stored: it is streamed once, and `J' C`, `C' C` and `C' e` are summed on the way.
 
-use super::score::Base;
+use super::base::Base;
 use crate::chain::free_run::Signals;
 use crate::chain::stream::{Rows, Stream};
 use crate::chain::table::Group;
@@ -14,24 +23,20 @@ use nalgebra::DVector;
 /// Makes columns (samples, outputs) of an experiment.
 type Columns<'a> = &'a dyn Fn(&Signals, &Matrix, &Experiment, usize) -> Result<Vec<Matrix>, Error>;
 
-/// A column of which a smaller part is left is the base model's own.
-pub(crate) const LEFT: f64 = 1e-7;
-
-/// Columns beside the base model's sensitivities.
+/// Columns without what the model's sensitivities can express.
 pub(crate) struct Projection {
-    /// Inner products of what is left of the columns.
+    /// `C' (I - Q) C`, (columns, columns).
     pub left: Matrix,
-    /// Inner products of what is left with the residual.
+    /// `C' (I - Q) e`.
     pub score: DVector<f64>,
-    /// Squares of the columns as they were.
+    /// Squares of the columns before the projection.
     pub squares: DVector<f64>,
-    /// What the base model would leave of the residual's squares by itself.
+    /// `e' (I - Q) e`.
     pub cost: f64,
 }
 
 impl Base<'_> {
-    /// So many columns beside the model's own, projected off its sensitivities. `columns` makes them for an
-    /// experiment from the signals and the output, and its place.
+    /// Projects n columns. `columns` makes them for an experiment from its signals, its output and its index.
     pub(crate) fn project(&self, n: usize, columns: Columns) -> Result<Projection, Error> {
         let unknowns = self.table.len;
         let mut cross = Matrix::zeros(unknowns, n);

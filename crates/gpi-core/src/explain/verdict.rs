@@ -1,19 +1,21 @@
-//! What an explanation comes to, and what to measure next.
+//! The verdict of an explanation, and what to measure next.
 
-use super::residual::{ResidualTest, STRUCTURE};
-use super::trial::Rejected;
+use super::policy::ProposalPolicy;
+use super::residual::{ResidualTest, STRUCTURE, WHITENESS};
+use super::state::Rejected;
 use crate::Record;
+use crate::effects::{CATALOGUE, SeparatedBy};
 use crate::spectrum::is_one_sine;
 
-/// How far what was measured is explained.
+/// How far the record is explained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// What is left shows no structure: it is the noise.
+    /// The residual shows no structure: it is noise.
     Explained,
-    /// Effects were found, and structure is left.
+    /// Effects were found, and the residual still has structure.
     PartlyExplained,
-    /// Structure is left, and no effect of the catalogue explains any of it.
+    /// The residual has structure, and no effect of the catalogue explains any of it.
     Unattributed,
 }
 
@@ -37,30 +39,33 @@ pub struct NextExperiment {
     pub command: String,
 }
 
-/// Whether tests show more than the noise of a model with these effects: a dependence on input or time,
-/// or memory.
+/// Whether tests show more than the noise of a model with these effects: a dependence on the input or on time, or
+/// autocorrelation.
 ///
-/// Memory alone is noise with a colour once `coloured-noise` is among the effects, and isolated wrong
-/// samples are no structure.
+/// Autocorrelation alone is noise once an effect explains it (`coloured-noise`), and isolated wrong samples are no
+/// structure.
 ///
 /// ```
 /// use gpi_core::explain::{ResidualTest, structured};
 /// let name = "whiteness";
 /// let test = ResidualTest {
-///     name, output: 0, statistic: 90.0, threshold: 50.0, p_value: 1e-8, points_to: "memory",
+///     name, output: 0, statistic: 90.0, threshold: 50.0, p_value: 1e-8, points_to: "memory".to_owned(),
 /// };
 /// assert!(structured(&[], &[test.clone()]));
 /// assert!(!structured(&["coloured-noise"], &[test]));
 /// ```
 pub fn structured(effects: &[&str], tests: &[ResidualTest]) -> bool {
-    let coloured = effects.contains(&"coloured-noise");
+    let is_explained = CATALOGUE
+        .iter()
+        .any(|entry| entry.explains_autocorrelation && effects.contains(&entry.name));
     let shows = |test: &ResidualTest| {
-        STRUCTURE.contains(&test.name) || (test.name == "whiteness" && !coloured)
+        STRUCTURE.contains(&test.name) || (test.name == WHITENESS && !is_explained)
     };
     tests.iter().any(|test| !test.passed() && shows(test))
 }
 
-pub(crate) fn verdict(effects: &[&str], tests: &[ResidualTest]) -> Verdict {
+/// The verdict on a model with these effects, from the tests of its residual.
+pub(super) fn verdict(effects: &[&str], tests: &[ResidualTest]) -> Verdict {
     match (structured(effects, tests), effects.is_empty()) {
         (false, _) => Verdict::Explained,
         (true, false) => Verdict::PartlyExplained,
@@ -68,44 +73,47 @@ pub(crate) fn verdict(effects: &[&str], tests: &[ResidualTest]) -> Verdict {
     }
 }
 
-/// The input that tells most effects apart.
+/// The kind of input that separates most effects.
 const TRIANGLE: &str = "triangle";
 
-/// The effects whose pictures are alike, what tells them apart, and the kind of input that does.
-const APART: [(&[&str], &str, &str); 3] = [
-    (
-        &["creep", "drift", "gain-drift"],
-        "hold the input still for minutes, at rest and after large steps: creep follows each step, drift \
-         does not, and a drifting gain shows only away from zero",
-        "steps",
-    ),
-    (
-        &["output-nonlinearity", "hysteresis-shape", "backlash", "stiffness"],
-        "drive slow triangles of several sizes around several levels: a sensor's curve depends on the \
-         level alone, a loop's shape on its past, and stiffness needs speed",
-        TRIANGLE,
-    ),
-    (
-        &["rate-dependence", "amplifier-slew", "linear-dynamics", "delay"],
-        "drive the same triangle at several speeds: a slew limit starts at one speed, loops that open \
-         with speed do so at all of them",
-        TRIANGLE,
-    ),
-];
+/// What separates effects that look alike, and the kind of input that does.
+fn separation(by: SeparatedBy) -> (&'static str, &'static str) {
+    match by {
+        SeparatedBy::Rests => (
+            "hold the input still for minutes, at rest and after large steps: creep follows each step, drift does \
+             not, and a drifting gain shows only away from zero",
+            "steps",
+        ),
+        SeparatedBy::Levels => (
+            "drive slow triangles of several sizes around several levels: a sensor's curve depends on the level \
+             alone, the shape of a loop on the input's history, and stiffness needs speed",
+            TRIANGLE,
+        ),
+        SeparatedBy::Speeds => (
+            "drive the same triangle at several speeds: a slew limit starts at one speed, loops that open with \
+             speed do so at all of them",
+            TRIANGLE,
+        ),
+        SeparatedBy::Nothing => ("repeat the experiment with another input", TRIANGLE),
+    }
+}
 
-pub(crate) fn next_experiment(
+/// What to measure next: what separates effects that this record cannot tell apart, or what shows more of the structure
+/// that is left.
+pub(super) fn next_experiment(
     rejected: &[Rejected],
     effects: &[&str],
     tests: &[ResidualTest],
     verdict: Verdict,
     record: &Record,
+    policy: &ProposalPolicy,
 ) -> Option<NextExperiment> {
     let (low, high) = crate::chain::bounds::range(record, 0);
     let rate = record.rate();
-    let duration = 600.0_f64.min(1e6 / rate);
+    let duration = policy.seconds.min(policy.samples / rate);
     let command = |kind: &str| {
         // a number that can be typed
-        let frequency = format!(" --frequency {}", (20e4 / duration).round() / 1e4);
+        let frequency = format!(" --frequency {}", (1e4 * policy.periods / duration).round() / 1e4);
         let frequency = if kind == TRIANGLE { frequency } else { String::new() };
         format!(
             "gpi excite {kind} --rate {rate} --duration {duration}{frequency} --range {low} {high} -o next.csv"
@@ -113,14 +121,15 @@ pub(crate) fn next_experiment(
     };
     let confounded = rejected.iter().find(|one| !one.confounded_with.is_empty());
     if let Some(one) = confounded {
-        let names = |name: &&str| *name == one.effect || one.confounded_with.contains(name);
-        let alike = |group: &[&str]| group.iter().filter(|name| names(name)).count() > 1;
-        let apart = APART.iter().find(|(group, ..)| alike(group));
+        let is_named = |name| name == one.effect || one.confounded_with.contains(&name);
+        let alike = |by: &SeparatedBy| {
+            let group = CATALOGUE.iter().filter(|entry| entry.separated_by == *by);
+            group.filter(|entry| is_named(entry.name)).count() > 1
+        };
+        let groups = [SeparatedBy::Rests, SeparatedBy::Levels, SeparatedBy::Speeds];
+        let by = groups.into_iter().find(alike).unwrap_or(SeparatedBy::Nothing);
+        let (how, kind) = separation(by);
         let with = one.confounded_with.join(", ");
-        let (how, kind) = apart
-            .map_or(("repeat the experiment with another input", TRIANGLE), |(_, how, kind)| {
-                (*how, *kind)
-            });
         let why = format!("{} and {with} explain the same here; {how}", one.effect);
         return Some(NextExperiment { why, command: command(kind) });
     }
@@ -128,7 +137,7 @@ pub(crate) fn next_experiment(
         return None;
     }
     if is_one_sine(record) {
-        let why = "one cycle that repeats cannot tell a sensor's curve, a loop's shape, stiffness or a mode \
+        let why = "one cycle that repeats cannot separate a sensor's curve, the shape of a loop, stiffness or a mode \
                    from the declared model; drive triangles of several sizes";
         return Some(NextExperiment { why: why.to_owned(), command: command(TRIANGLE) });
     }
@@ -138,8 +147,8 @@ pub(crate) fn next_experiment(
         .max_by(|a, b| (a.statistic / a.threshold).total_cmp(&(b.statistic / b.threshold)))?;
     let found = if effects.is_empty() { "nothing" } else { "not everything" };
     let why = format!(
-        "{found} in the catalogue explains the residual, which fails the test `{}` ({}); a record that \
-         moves one thing at a time tells more",
+        "{found} in the catalogue explains the residual, which fails the test `{}` ({}); a record in which \
+         one thing changes at a time tells more",
         worst.name, worst.points_to
     );
     Some(NextExperiment { why, command: command(TRIANGLE) })
@@ -163,7 +172,15 @@ mod tests {
     fn confused(effect: &'static str, with: &'static str) -> NextExperiment {
         let rejected =
             Rejected { effect, holdout_rms: 1.0, why: String::new(), confounded_with: vec![with] };
-        next_experiment(&[rejected], &[with], &[], Verdict::Explained, &record()).unwrap()
+        next_experiment(
+            &[rejected],
+            &[with],
+            &[],
+            Verdict::Explained,
+            &record(),
+            &ProposalPolicy::default(),
+        )
+        .unwrap()
     }
 
     #[test]
@@ -181,6 +198,16 @@ mod tests {
 
     #[test]
     fn nothing_is_asked_for_where_all_is_explained() {
-        assert_eq!(next_experiment(&[], &[], &[], Verdict::Explained, &record()), None);
+        assert_eq!(
+            next_experiment(
+                &[],
+                &[],
+                &[],
+                Verdict::Explained,
+                &record(),
+                &ProposalPolicy::default()
+            ),
+            None
+        );
     }
 }

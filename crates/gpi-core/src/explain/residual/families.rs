@@ -1,6 +1,8 @@
 //! Functions of input, intermediate signal, output and time that a residual must not follow.
 
-use super::Beside;
+use super::compared::Compared;
+use super::outcome::points_to;
+use super::policy::ResidualPolicy;
 use crate::Matrix;
 
 /// A function of experiment and sample.
@@ -9,7 +11,7 @@ pub(super) type Regressor<'a> = Box<dyn Fn(usize, usize) -> f64 + 'a>;
 /// Regressors that point to the same effects.
 pub(super) struct Family<'a> {
     pub name: &'static str,
-    pub points_to: &'static str,
+    pub points_to: String,
     pub regressors: Vec<Regressor<'a>>,
 }
 
@@ -17,52 +19,53 @@ pub(super) struct Family<'a> {
 pub(super) type Signal = Vec<Vec<f64>>;
 
 /// A signal and its step from sample to sample, both of order one.
-pub(super) struct Moving {
+pub(super) struct ScaledSignal {
     /// Between minus one and one.
     pub level: Signal,
     /// Over its root mean square.
     pub speed: Signal,
-    /// How large the fast swings of the level are.
-    pub swing: Signal,
+    /// How large the fast changes of the level are.
+    pub amplitude: Signal,
 }
 
 /// What a residual of one output is compared with.
-pub(super) struct Signals {
-    pub inputs: Vec<Moving>,
+pub(super) struct ScaledSignals {
+    pub inputs: Vec<ScaledSignal>,
     /// The model's v, whose past is what G sees.
-    pub intermediates: Vec<Moving>,
-    output: Moving,
+    pub intermediates: Vec<ScaledSignal>,
+    output: ScaledSignal,
     samples: Vec<usize>,
 }
 
-impl Signals {
-    pub(super) fn new(beside: &Beside, output: usize) -> Self {
-        /// Seconds over which a swing is taken.
-        const SWING: f64 = 0.05;
-        let window = SWING * beside.record.rate();
-        let given: Vec<&Matrix> = beside.record.experiments().iter().map(|e| &e.input).collect();
-        let v: Vec<&Matrix> = beside.intermediate.iter().collect();
-        let simulated: Vec<&Matrix> = beside.simulated.iter().collect();
-        let channels = 0..beside.record.inputs().len();
+impl ScaledSignals {
+    pub(super) fn new(given: &Compared, output: usize) -> Self {
+        let window = given.policy.amplitude_seconds * given.record.rate();
+        let inputs: Vec<&Matrix> = given.record.experiments().iter().map(|e| &e.input).collect();
+        let v: Vec<&Matrix> = given.intermediate.iter().collect();
+        let simulated: Vec<&Matrix> = given.simulated.iter().collect();
+        let channels = 0..given.record.inputs().len();
         Self {
-            inputs: channels.clone().map(|input| Moving::of(&given, input, window)).collect(),
-            intermediates: channels.map(|input| Moving::of(&v, input, window)).collect(),
-            output: Moving::of(&simulated, output, window),
-            samples: given.iter().map(|m| m.nrows()).collect(),
+            inputs: channels
+                .clone()
+                .map(|input| ScaledSignal::of(&inputs, input, window))
+                .collect(),
+            intermediates: channels.map(|input| ScaledSignal::of(&v, input, window)).collect(),
+            output: ScaledSignal::of(&simulated, output, window),
+            samples: inputs.iter().map(|m| m.nrows()).collect(),
         }
     }
 
     /// All families, those of the inputs with the regressors of every input.
-    pub(super) fn families(&self) -> Vec<Family<'_>> {
+    pub(super) fn families<'a>(&'a self, policy: &'a ResidualPolicy) -> Vec<Family<'a>> {
         let x = &self.output.level;
         let mut families = vec![
-            Family::new("past-input", "linear-dynamics, delay, creep"),
-            Family::new("past-intermediate", "linear-dynamics, creep"),
-            Family::new("level", "output-nonlinearity, envelope"),
-            Family::new("speed", "rate-dependence, amplifier-slew"),
-            Family::new("direction", "backlash, hysteresis-shape"),
-            Family::new("amplitude", "stiffness"),
-            Family::new("trend", "drift, gain-drift, creep"),
+            Family::new("past-input", ""),
+            Family::new("past-intermediate", ""),
+            Family::new("level", "envelope"),
+            Family::new("speed", ""),
+            Family::new("direction", ""),
+            Family::new("amplitude", ""),
+            Family::new("trend", ""),
         ];
         let [past_input, past_intermediate, level, speed, direction, amplitude, trend] =
             &mut families[..]
@@ -70,10 +73,10 @@ impl Signals {
             return families;
         };
         level.powers(x, 1..=5);
-        amplitude.regressors.push(Box::new(|e, k| self.output.swing[e][k] * x[e][k]));
+        amplitude.regressors.push(Box::new(|e, k| self.output.amplitude[e][k] * x[e][k]));
         for input in &self.inputs {
-            past_input.past(input);
-            let s = |e: usize, k: usize| input.speed[e][k].clamp(-5.0, 5.0);
+            past_input.past(input, &policy.past);
+            let s = |e: usize, k: usize| input.speed[e][k].clamp(-policy.fastest, policy.fastest);
             speed.regressors.push(Box::new(move |e, k| s(e, k).abs()));
             speed.regressors.push(Box::new(move |e, k| s(e, k) * s(e, k).abs()));
             speed.regressors.push(Box::new(move |e, k| s(e, k) * s(e, k)));
@@ -82,10 +85,10 @@ impl Signals {
                 let sign = move |e: usize, k: usize| sign(input.speed[e][k]);
                 direction.regressors.push(Box::new(move |e, k| sign(e, k) * x[e][k].powi(power)));
             }
-            let swing = &self.output.swing;
-            amplitude.regressors.push(Box::new(move |e, k| swing[e][k] * input.speed[e][k]));
+            let size = &self.output.amplitude;
+            amplitude.regressors.push(Box::new(move |e, k| size[e][k] * input.speed[e][k]));
         }
-        self.intermediates.iter().for_each(|v| past_intermediate.past(v));
+        self.intermediates.iter().for_each(|v| past_intermediate.past(v, &policy.past));
         let time = |e: usize, k: usize| 2.0 * k as f64 / self.samples[e] as f64 - 1.0;
         trend.regressors.push(Box::new(time));
         trend.regressors.push(Box::new(move |e, k| time(e, k).powi(2)));
@@ -97,14 +100,14 @@ impl Signals {
 }
 
 impl<'a> Family<'a> {
-    fn new(name: &'static str, points_to: &'static str) -> Self {
-        Self { name, points_to, regressors: Vec::new() }
+    fn new(name: &'static str, otherwise: &str) -> Self {
+        Self { name, points_to: points_to(name, otherwise), regressors: Vec::new() }
     }
 
-    /// The level, and steps of the past.
-    fn past(&mut self, signal: &'a Moving) {
+    /// The level, and steps of the past by these lags.
+    fn past(&mut self, signal: &'a ScaledSignal, lags: &[usize]) {
         self.regressors.push(Box::new(|e, k| signal.level[e][k]));
-        for lag in [0, 1, 2, 4, 8, 16, 32, 64, 128, 256] {
+        for &lag in lags {
             self.regressors.push(Box::new(move |e, k| signal.step(e, k, lag)));
         }
     }
@@ -116,7 +119,7 @@ impl<'a> Family<'a> {
     }
 }
 
-impl Moving {
+impl ScaledSignal {
     fn of(signals: &[&Matrix], column: usize, window: f64) -> Self {
         let values =
             || signals.iter().flat_map(|m| m.column(column).iter().copied().collect::<Vec<_>>());
@@ -130,8 +133,8 @@ impl Moving {
         let count = speed.iter().map(Vec::len).sum::<usize>() as f64;
         let scale = (squares / count).sqrt().max(f64::MIN_POSITIVE);
         speed.iter_mut().flatten().for_each(|s| *s /= scale);
-        let swing = level.iter().map(|x| swelling(x, window)).collect();
-        Self { level, speed, swing }
+        let amplitude = level.iter().map(|x| local_amplitude(x, window)).collect();
+        Self { level, speed, amplitude }
     }
 
     /// The level, then the steps so many samples ago.
@@ -160,9 +163,8 @@ fn sign(s: f64) -> f64 {
     if s == 0.0 { 0.0 } else { s.signum() }
 }
 
-/// How large the swings of a signal are at each sample: the square of what is fast in it, smoothed over
-/// so many samples.
-fn swelling(signal: &[f64], samples: f64) -> Vec<f64> {
+/// The local amplitude of a signal: the square of its fast part, smoothed over so many samples.
+fn local_amplitude(signal: &[f64], samples: f64) -> Vec<f64> {
     let keep = (-1.0 / samples.max(1.0)).exp();
     let (mut slow, mut square) = (signal.first().copied().unwrap_or(0.0), 0.0);
     signal

@@ -1,48 +1,44 @@
 //! Lines in the residual's spectrum.
 
-use super::chance::exceeded_with;
-use super::{Beside, ResidualTest};
+use super::compared::Compared;
+use super::outcome::{ResidualTest, points_to};
+use super::policy::ResidualPolicy;
+use super::significance::exceeded_with;
 use crate::Matrix;
 use crate::spectrum::tapered;
 use crate::uncertainty::noise_model::NoiseModel;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-/// Neighbouring places of a spectrum that a line is compared with.
-const AROUND: usize = 64;
-
 /// Residuals whose spectrum is flat but for its lines: a line stands out of a steep spectrum only then.
 ///
-/// The colour is taken from what the residuals are without their lines, which it would follow otherwise.
-pub(super) fn flattened(beside: &Beside) -> Vec<Matrix> {
-    let mut smooth = beside.residuals.to_vec();
-    for (residual, experiment) in smooth.iter_mut().zip(beside.record.experiments()) {
-        for run in experiment.scored_runs().filter(|run| run.len() >= 4 * AROUND) {
+/// The autoregression that whitens them is fitted to the residuals without their lines, which it would follow otherwise.
+pub(super) fn flattened(given: &Compared) -> Vec<Matrix> {
+    let policy = given.policy;
+    let mut smooth = given.residuals.to_vec();
+    for (residual, experiment) in smooth.iter_mut().zip(given.record.experiments()) {
+        for run in experiment.scored_runs().filter(|run| run.len() >= 4 * policy.around) {
             for mut column in residual.column_iter_mut() {
                 let values = &mut column.as_mut_slice()[run.clone()];
-                let without = without_lines(values);
+                let without = without_lines(values, policy);
                 values.copy_from_slice(&without);
             }
         }
     }
-    NoiseModel::of(&smooth, beside.record).whiten(beside.residuals)
+    NoiseModel::of(&smooth, given.record).whiten(given.residuals)
 }
 
-/// A signal, tapered, with the narrow peaks of its spectrum cut down to what is beside them.
-fn without_lines(values: &[f64]) -> Vec<f64> {
-    /// A line is a few places wide; a resonance is wider, and part of the colour.
-    const NEAR: usize = 4;
-    const FAR: usize = 12;
-    /// Times the median on either side, of which one is higher on a slope.
-    const STANDS_OUT: f64 = 12.0;
+/// A signal, tapered, with the narrow peaks of its spectrum cut down to the background on both sides.
+fn without_lines(values: &[f64], policy: &ResidualPolicy) -> Vec<f64> {
+    let ResidualPolicy { line_near: near, line_far: far, stands_out, .. } = *policy;
     let n = values.len();
     let mut spectrum = tapered(values);
     let power: Vec<f64> = spectrum[..n / 2].iter().map(Complex64::norm_sqr).collect();
-    for k in NEAR + 1..power.len() - NEAR {
-        let below = median(&power[k.saturating_sub(FAR).max(1)..=k - NEAR]);
-        let above = median(&power[k + NEAR..power.len().min(k + FAR + 1)]);
+    for k in near + 1..power.len() - near {
+        let below = median(&power[k.saturating_sub(far).max(1)..=k - near]);
+        let above = median(&power[k + near..power.len().min(k + far + 1)]);
         let background = below.max(above);
-        if power[k] > STANDS_OUT * background {
+        if power[k] > stands_out * background {
             let scale = (background / power[k]).sqrt();
             spectrum[k] *= scale;
             spectrum[n - k] *= scale;
@@ -54,38 +50,38 @@ fn without_lines(values: &[f64]) -> Vec<f64> {
 
 /// The largest line of the periodogram over the median of those around it (Fisher's test, against the
 /// local background): the same for noise of any smooth spectrum.
-pub(super) fn lines(beside: &Beside, output: usize, chance: f64) -> ResidualTest {
+pub(super) fn lines(given: &Compared, output: usize, significance: f64) -> ResidualTest {
+    let around = given.policy.around;
     let (mut most, mut count) = (0.0_f64, 0.0_f64);
-    for (residual, experiment) in beside.residuals.iter().zip(beside.record.experiments()) {
+    for (residual, experiment) in given.residuals.iter().zip(given.record.experiments()) {
         for run in experiment.scored_rows(residual) {
             let values = run.column(output);
-            for chunk in periodogram(values.as_slice()).chunks_exact(AROUND) {
+            for chunk in periodogram(values.as_slice(), given.policy).chunks_exact(around) {
                 let largest = chunk.iter().copied().fold(0.0, f64::max);
                 most = most.max(largest / median(chunk).max(f64::MIN_POSITIVE));
-                count += AROUND as f64;
+                count += around as f64;
             }
         }
     }
-    let tail = |ratio: f64| count.max(1.0) * single_above(ratio);
+    let tail = |ratio: f64| count.max(1.0) * single_above(ratio, around);
     ResidualTest {
         name: "lines",
         output,
         statistic: most,
-        threshold: exceeded_with(chance, tail),
+        threshold: exceeded_with(significance, tail),
         p_value: tail(most).min(1.0),
-        points_to: "periodic-disturbance",
+        points_to: points_to("lines", ""),
     }
 }
 
-/// Power over frequency without its slowest places; nothing where it would be shorter than [`AROUND`].
-fn periodogram(values: &[f64]) -> Vec<f64> {
-    const SLOWEST: usize = 4;
+/// Power over frequency without its slowest places; nothing where it would be too short for a background.
+fn periodogram(values: &[f64], policy: &ResidualPolicy) -> Vec<f64> {
     let n = values.len();
-    if n < 4 * AROUND {
+    if n < 4 * policy.around {
         return Vec::new();
     }
     let spectrum = tapered(values);
-    spectrum[SLOWEST..n / 2].iter().map(Complex64::norm_sqr).collect()
+    spectrum[policy.slowest..n / 2].iter().map(Complex64::norm_sqr).collect()
 }
 
 /// The upper one of two in the middle.
@@ -95,12 +91,12 @@ fn median(values: &[f64]) -> f64 {
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The chance that one exponential number exceeds the median of the others by this ratio.
+/// The probability that one exponential number exceeds the median of the others by this ratio.
 ///
 /// `E exp(-ratio m)` of the m that is the j-th smallest of n exponential numbers is
 /// `prod_i (n - i) / (n - i + ratio)` for i from 0 to j - 1; j is one below the place of the median, which
 /// makes up for neighbours that the window ties together.
-fn single_above(ratio: f64) -> f64 {
-    let others = (AROUND / 2..AROUND).map(|left| left as f64);
+fn single_above(ratio: f64, around: usize) -> f64 {
+    let others = (around / 2..around).map(|left| left as f64);
     others.map(|left| left / (left + ratio)).product()
 }

@@ -1,13 +1,15 @@
-//! The residual's mean.
+//! The mean of the residual.
 
+use super::compared::Compared;
 use super::independence::{BlockSums, dependence};
-use super::{Beside, ResidualTest};
+use super::outcome::{ResidualTest, points_to};
 
 /// Whether the residual is zero on average.
-pub(super) fn mean(beside: &Beside, output: usize, chance: f64) -> ResidualTest {
-    let mut sums = BlockSums::new(beside.record.scored());
-    for (experiment, k) in beside.scored() {
-        sums.add(beside.residuals[experiment][(k, output)]);
+pub(super) fn mean(given: &Compared, output: usize, significance: f64) -> ResidualTest {
+    let mut sums = BlockSums::new(given.record.scored(), given.policy.blocks);
+    for (experiment, k) in given.scored() {
+        sums.add(given.residuals[experiment][(k, output)]);
     }
-    dependence("mean", "an offset that moved, drift", output, &[sums.t()], chance)
+    let points_to = points_to("mean", "an offset that changed");
+    dependence("mean", points_to, output, &[sums.t()], significance, given.policy)
 }

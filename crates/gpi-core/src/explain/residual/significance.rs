@@ -1,34 +1,34 @@
-//! Chances of the statistics where there is nothing to be found, and the values that have a given chance.
+//! Distributions of the statistics where the residual is noise: tail probabilities, and their inverses.
 
 use statrs::function::{erf, gamma};
 
-/// The chance of a standard normal number beyond plus or minus z.
+/// The probability of a standard normal number beyond plus or minus z.
 pub(super) fn normal_tails(z: f64) -> f64 {
     erf::erfc(z / std::f64::consts::SQRT_2)
 }
 
-/// The size that a standard normal number exceeds with this chance.
-pub(super) fn normal_beyond(chance: f64) -> f64 {
-    std::f64::consts::SQRT_2 * erf::erfc_inv(chance)
+/// The size that a standard normal number exceeds with this probability.
+pub(super) fn normal_beyond(significance: f64) -> f64 {
+    std::f64::consts::SQRT_2 * erf::erfc_inv(significance)
 }
 
-/// The chance of a chi-square number above `value`.
+/// The probability of a chi-square number above `value`.
 pub(super) fn chi_square_tail(value: f64, freedom: f64) -> f64 {
     gamma::gamma_ur(0.5 * freedom, 0.5 * value.max(1e-300))
 }
 
-/// The chance of at least `count` events where so many are expected (Poisson).
+/// The probability of at least `count` events where so many are expected (Poisson).
 pub(super) fn at_least(count: usize, expected: f64) -> f64 {
     if count == 0 { 1.0 } else { gamma::gamma_lr(count as f64, expected.max(1e-300)) }
 }
 
-/// Where a falling tail comes down to a chance.
-pub(super) fn exceeded_with(chance: f64, tail: impl Fn(f64) -> f64) -> f64 {
+/// Where a falling tail comes down to a probability.
+pub(super) fn exceeded_with(significance: f64, tail: impl Fn(f64) -> f64) -> f64 {
     const DOUBLINGS: usize = 60;
     const HALVINGS: usize = 100;
     let mut high = 1.0;
     for _ in 0..DOUBLINGS {
-        if tail(high) <= chance {
+        if tail(high) <= significance {
             break;
         }
         high *= 2.0;
@@ -36,7 +36,7 @@ pub(super) fn exceeded_with(chance: f64, tail: impl Fn(f64) -> f64) -> f64 {
     let mut low = 0.0;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        if tail(middle) > chance { low = middle } else { high = middle }
+        if tail(middle) > significance { low = middle } else { high = middle }
     }
     high
 }
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_and_chances_are_those_of_the_tables() {
+    fn values_and_probabilities_are_those_of_the_tables() {
         assert!((normal_beyond(0.05) - 1.959_964).abs() < 1e-5);
         assert!((normal_tails(normal_beyond(1e-6)) / 1e-6 - 1.0).abs() < 1e-6);
         let value = exceeded_with(0.01, |value| chi_square_tail(value, 25.0));

@@ -1,0 +1,325 @@
+//! Which trial is accepted, and why another one is not: functions of numbers alone.
+//!
+//! A trial is the whole model with one more effect, fitted jointly. With J the weighted sum of squared residuals
+//! over the N training values, its *deviance* `N ln(J_before / J_after)` is twice the rise of the log-likelihood of
+//! white Gaussian noise. Where the effect is absent, q superfluous parameters raise it by about q. The trial is
+//! accepted if all of the following holds.
+//!
+//! 1. *Driven*: what the input is said to drive does not stand there as a decay from the initial state.
+//! 2. *Significant*: the deviance exceeds the threshold `max(q ln N + 2 ln L, p N)` (T8 in the documentation's
+//!    theory). `q ln N` is the price of q parameters in the BIC; `2 ln L` raises it for the best of L candidates
+//!    (Bonferroni's correction, since a chi-square tail falls as `exp(-x / 2)`); `p N` asks for a part p of the squares.
+//!    Autocorrelated residuals are worth fewer samples than they have: with a factor kappa, by which the covariance
+//!    of the parameters exceeds that for white noise, the first two terms count kappa times.
+//! 3. *Confirmed*: the squares of the held-out blocks fall, see [`is_confirmed`].
+//! 4. *Substantial*: far from the noise a bad fit resembles many effects a little, so a large part of the training
+//!    and of the held-out squares must go. This is not asked near the noise, of an effect whose signature no bad fit
+//!    has, or of more of a driven effect that the model has already.
+//!
+//! Of the accepted trials the one with the largest deviance beyond its threshold is taken. Trials whose deviance lies
+//! within that threshold of its own explain the same: of these, one with plausible parameters is preferred, and the
+//! others are reported as confounded.
+
+use super::policy::JudgementPolicy;
+
+/// What a trial's deviance must exceed, before the residual's autocorrelation is known.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Significance {
+    /// N, the number of training values.
+    pub values: f64,
+    /// q, the number of parameters that were added.
+    pub added: usize,
+    /// Whether derivatives of the whole record would take long, and parts of it stand for the rest.
+    pub is_long: bool,
+    /// Whether the model has this driven effect already.
+    pub is_more: bool,
+}
+
+impl Significance {
+    fn white(&self, policy: &JudgementPolicy) -> f64 {
+        self.added.max(1) as f64 * self.values.ln() + 2.0 * policy.looks.ln()
+    }
+
+    /// More of what a long record shows already need not be much: its held-out blocks are many samples.
+    fn is_certain_to_be_real(&self) -> bool {
+        self.is_long && self.is_more
+    }
+
+    /// The threshold for white noise.
+    pub(super) fn threshold(&self, policy: &JudgementPolicy) -> f64 {
+        let white = self.white(policy);
+        if self.is_certain_to_be_real() { white } else { white.max(policy.least * self.values) }
+    }
+
+    /// Whether the residual's autocorrelation could change the answer.
+    pub(super) fn depends_on_autocorrelation(
+        &self,
+        deviance: f64,
+        policy: &JudgementPolicy,
+    ) -> bool {
+        let is_beyond = self.is_long && deviance > policy.certain * self.white(policy);
+        deviance > self.threshold(policy) && !self.is_certain_to_be_real() && !is_beyond
+    }
+
+    /// The threshold for noise whose autocorrelation raises the covariance by a factor.
+    pub(super) fn threshold_of_autocorrelated(&self, factor: f64, policy: &JudgementPolicy) -> f64 {
+        self.threshold(policy).max(factor * self.white(policy))
+    }
+}
+
+/// What is known of a trial.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Evidence<'a> {
+    /// Twice the rise of the log-likelihood that is the effect's own.
+    pub deviance: f64,
+    /// What it must exceed.
+    pub threshold: f64,
+    /// Training squares without and with the effect.
+    pub squares: [f64; 2],
+    /// The squares that noise alone would leave.
+    pub noise: f64,
+    /// Squares of each held-out block without and with the effect.
+    pub held_out: [&'a [f64]; 2],
+    /// Whether the input makes it explain what it does, where it is an effect that the input drives.
+    pub is_driven: bool,
+    /// Whether no bad fit has its signature.
+    pub is_unique: bool,
+    /// Whether the model has this driven effect already.
+    pub is_more: bool,
+    /// Whether its parameters are such as a machine can have.
+    pub is_plausible: bool,
+}
+
+/// Why a trial is not accepted, or not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Refusal {
+    /// The input does not drive what the effect explains.
+    Undriven,
+    /// No more than superfluous parameters gain.
+    Insignificant,
+    /// The held-out blocks do not become better.
+    Unconfirmed,
+    /// Far from the noise, too small a part of the residual.
+    Insubstantial,
+    /// Another effect explains as much.
+    Confounded,
+    /// Another effect explains more.
+    Inferior,
+}
+
+impl Refusal {
+    /// What is said of the effect, after its name; `taken` is the one that was accepted instead.
+    pub(super) fn in_words(self, taken: &str) -> String {
+        match self {
+            Self::Undriven => "is a decay here, which the input does not drive".to_owned(),
+            Self::Insignificant => "gains no more than the significance threshold".to_owned(),
+            Self::Unconfirmed => "is not confirmed by the held-out blocks".to_owned(),
+            Self::Insubstantial => {
+                "removes too small a part of the residual, which is far above the noise".to_owned()
+            }
+            Self::Confounded => format!("explains as much as {taken}"),
+            Self::Inferior => format!("explains less than {taken}"),
+        }
+    }
+}
+
+/// Whether a trial is accepted by itself.
+pub(super) fn judge(trial: &Evidence, policy: &JudgementPolicy) -> Result<(), Refusal> {
+    if !trial.is_driven {
+        Err(Refusal::Undriven)
+    } else if trial.deviance <= trial.threshold {
+        Err(Refusal::Insignificant)
+    } else if !is_confirmed(trial.held_out, policy) {
+        Err(Refusal::Unconfirmed)
+    } else if !is_weighty(trial, policy) {
+        Err(Refusal::Insubstantial)
+    } else {
+        Ok(())
+    }
+}
+
+/// The place of the trial to take, of those that are sorted by their deviance beyond the threshold.
+pub(super) fn choose(trials: &[Evidence], policy: &JudgementPolicy) -> Option<usize> {
+    let is_accepted = |trial: &Evidence| judge(trial, policy).is_ok();
+    let best = trials.iter().position(is_accepted)?;
+    let is_as_good = |trial: &Evidence| {
+        explains_as_much(trial, &trials[best]) && is_accepted(trial) && trial.is_plausible
+    };
+    Some(trials.iter().position(is_as_good).unwrap_or(best))
+}
+
+/// Why a trial was not taken, with the one that was taken if any.
+pub(super) fn refusal(
+    trial: &Evidence,
+    taken: Option<&Evidence>,
+    policy: &JudgementPolicy,
+) -> Refusal {
+    match taken {
+        _ if !trial.is_driven => Refusal::Undriven,
+        Some(taken) if explains_as_much(trial, taken) => Refusal::Confounded,
+        Some(_) => Refusal::Inferior,
+        None => judge(trial, policy).err().unwrap_or(Refusal::Inferior),
+    }
+}
+
+/// Whether the deviance reaches that of another one up to the other's threshold.
+fn explains_as_much(trial: &Evidence, other: &Evidence) -> bool {
+    trial.deviance > other.deviance - other.threshold
+}
+
+/// Whether a trial is substantial, or need not be.
+fn is_weighty(trial: &Evidence, policy: &JudgementPolicy) -> bool {
+    let takes = |part: f64, [before, after]: [f64; 2]| after < (1.0 - part) * before;
+    let is_substantial = takes(policy.substantial, trial.squares)
+        && takes(policy.substantial_held_out, trial.held_out.map(|blocks| blocks.iter().sum()));
+    let is_near_noise = trial.squares[1] < policy.near_noise * trial.noise;
+    is_substantial || is_near_noise || trial.is_unique || trial.is_more
+}
+
+/// Whether the held-out squares, block by block without and with an effect, have fallen significantly.
+///
+/// The sum must fall. Beyond that, either the mean difference of the blocks exceeds its standard error by a factor,
+/// or the blocks that become better gain far more than the others lose: an effect may show in few blocks only, and
+/// makes their differences vary.
+pub(super) fn is_confirmed([before, after]: [&[f64]; 2], policy: &JudgementPolicy) -> bool {
+    let differences: Vec<f64> = before.iter().zip(after).map(|(a, b)| a - b).collect();
+    let n = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / n;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    let total: f64 = before.iter().sum();
+    let gained: f64 = differences.iter().filter(|d| **d > 0.0).sum();
+    let lost: f64 = -differences.iter().filter(|d| **d < 0.0).sum::<f64>();
+    let one_sided = gained > policy.one_sided * lost;
+    let is_sure = one_sided || mean > policy.standard_errors * (variance / n).sqrt();
+    mean * n > policy.confirmed * total && is_sure
+}
+
+/// Whether an earlier effect is superfluous: the deviance lost without it is below the newest effect's threshold, and
+/// the held-out squares (with it, without it) do not grow beyond a factor.
+pub(super) fn is_superfluous(
+    lost: f64,
+    threshold: f64,
+    held_out: [&[f64]; 2],
+    factor: f64,
+) -> bool {
+    let [with, without] = held_out.map(|blocks| blocks.iter().sum::<f64>());
+    lost < threshold && without < factor * with
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BEFORE: [f64; 4] = [10.0, 11.0, 9.0, 10.0];
+    const AFTER: [f64; 4] = [5.0, 5.5, 4.5, 5.0];
+
+    /// A trial that meets every condition, far from the noise.
+    fn sound() -> Evidence<'static> {
+        Evidence {
+            deviance: 500.0,
+            threshold: 40.0,
+            squares: [100.0, 60.0],
+            noise: 1.0,
+            held_out: [&BEFORE, &AFTER],
+            is_driven: true,
+            is_unique: false,
+            is_more: false,
+            is_plausible: true,
+        }
+    }
+
+    fn judged(change: impl FnOnce(&mut Evidence<'static>)) -> Result<(), Refusal> {
+        let mut trial = sound();
+        change(&mut trial);
+        judge(&trial, &JudgementPolicy::default())
+    }
+
+    #[test]
+    fn each_condition_refuses_with_its_reason() {
+        assert_eq!(judged(|_| ()), Ok(()));
+        assert_eq!(judged(|trial| trial.is_driven = false), Err(Refusal::Undriven));
+        assert_eq!(judged(|trial| trial.deviance = 40.0), Err(Refusal::Insignificant));
+        let unconfirmed = judged(|trial| trial.held_out = [&BEFORE, &BEFORE]);
+        assert_eq!(unconfirmed, Err(Refusal::Unconfirmed));
+        assert_eq!(judged(|trial| trial.squares[1] = 71.0), Err(Refusal::Insubstantial));
+        let little = judged(|trial| trial.held_out = [&BEFORE, &[8.1, 9.0, 7.3, 8.1]]);
+        assert_eq!(little, Err(Refusal::Insubstantial));
+    }
+
+    #[test]
+    fn a_small_part_is_enough_near_the_noise_and_for_what_is_known_or_unique() {
+        let small = |change: fn(&mut Evidence)| {
+            judged(|trial| {
+                trial.squares[1] = 90.0;
+                change(trial);
+            })
+        };
+        assert_eq!(small(|_| ()), Err(Refusal::Insubstantial));
+        assert_eq!(small(|trial| trial.noise = 90.0 / 2.2), Ok(()));
+        assert_eq!(small(|trial| trial.noise = 90.0 / 2.3), Err(Refusal::Insubstantial));
+        assert_eq!(small(|trial| trial.is_unique = true), Ok(()));
+        assert_eq!(small(|trial| trial.is_more = true), Ok(()));
+    }
+
+    #[test]
+    fn of_equals_a_plausible_one_is_taken_and_the_others_are_confounded() {
+        let policy = JudgementPolicy::default();
+        let best = Evidence { is_plausible: false, ..sound() };
+        let equal = Evidence { deviance: 470.0, ..sound() };
+        let weaker = Evidence { deviance: 450.0, ..sound() };
+        assert_eq!(choose(&[best, equal, weaker], &policy), Some(1));
+        assert_eq!(choose(&[best, weaker], &policy), Some(0));
+        let unconfirmed = Evidence { held_out: [&BEFORE, &BEFORE], ..best };
+        assert_eq!(choose(&[unconfirmed, weaker], &policy), Some(1));
+        assert_eq!(choose(&[unconfirmed], &policy), None);
+        assert_eq!(refusal(&equal, Some(&best), &policy), Refusal::Confounded);
+        assert_eq!(refusal(&weaker, Some(&best), &policy), Refusal::Inferior);
+        assert_eq!(refusal(&unconfirmed, None, &policy), Refusal::Unconfirmed);
+        let decay = Evidence { is_driven: false, ..equal };
+        assert_eq!(refusal(&decay, Some(&best), &policy), Refusal::Undriven);
+    }
+
+    #[test]
+    fn blocks_confirm_by_their_mean_or_by_being_one_sided() {
+        let policy = JudgementPolicy::default();
+        let confirmed = |after: [f64; 4]| is_confirmed([&[10.0; 4], &after], &policy);
+        assert!(confirmed([9.0, 9.1, 8.9, 9.0]));
+        // all in one block, hardly worse in the others
+        assert!(confirmed([4.0, 10.1, 10.1, 10.1]));
+        assert!(!confirmed([4.0, 11.0, 11.0, 11.0]));
+        // sure, and of no use
+        assert!(!confirmed([9.96; 4]));
+        assert!(!confirmed([10.5; 4]));
+        assert!(!is_confirmed([&[], &[]], &policy));
+    }
+
+    #[test]
+    fn the_threshold_counts_parameters_looks_and_autocorrelation() {
+        let policy = JudgementPolicy::default();
+        let of = |values, is_long, is_more| Significance { values, added: 2, is_long, is_more };
+        let white = |values: f64| 2.0 * values.ln() + 2.0 * 150_f64.ln();
+        assert!((of(500.0, false, false).threshold(&policy) - white(500.0)).abs() < 1e-12);
+        // of many values a part of the squares is asked for
+        let usual = of(1e5, false, false);
+        assert!((usual.threshold(&policy) - 4000.0).abs() < 1e-9);
+        assert!(usual.depends_on_autocorrelation(4001.0, &policy));
+        assert!(!usual.depends_on_autocorrelation(3999.0, &policy));
+        let raised = usual.threshold_of_autocorrelated(200.0, &policy);
+        assert!((raised - 200.0 * white(1e5)).abs() < 1e-9);
+        assert_eq!(usual.threshold_of_autocorrelated(1.0, &policy), usual.threshold(&policy));
+        // more of what a long record shows need not be much, and no autocorrelation explains very much
+        let more = of(1e5, true, true);
+        assert!((more.threshold(&policy) - white(1e5)).abs() < 1e-12);
+        assert!(!more.depends_on_autocorrelation(1e9, &policy));
+        assert!(!of(1e5, true, false).depends_on_autocorrelation(1e9, &policy));
+        assert!(usual.depends_on_autocorrelation(1e9, &policy));
+    }
+
+    #[test]
+    fn an_effect_is_superfluous_where_nothing_is_lost_without_it() {
+        let superfluous = |lost, without| is_superfluous(lost, 40.0, [&[1.0, 1.0], without], 1.5);
+        assert!(superfluous(30.0, &[1.4, 1.4]));
+        assert!(!superfluous(40.0, &[1.0, 1.0]));
+        assert!(!superfluous(30.0, &[1.6, 1.6]));
+    }
+}

@@ -1,0 +1,273 @@
+//! Every tolerance and every choice of the search, with its meaning and the reason for its value.
+//!
+//! "By hand" means that nobody derived the value: it was chosen on simulated stages, and docs/scoreboard.md
+//! shows what all values together achieve. "Squares" are weighted sums of squared residuals.
+
+use super::settings::{FROM_ONE, PART, POSITIVE, settings};
+use crate::Error;
+
+/// How [`explain`](super::explain) searches.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct SearchPolicy {
+    /// What is held out.
+    pub holdout: HoldoutPolicy,
+    /// Plays and deadzones of the declared model.
+    pub grid: GridPolicy,
+    /// Which effects are fitted.
+    pub ranking: RankingPolicy,
+    /// How long they are fitted.
+    pub fits: FitPolicy,
+    /// Which of them are accepted.
+    pub judgement: JudgementPolicy,
+    /// When an earlier decision is changed.
+    pub revision: RevisionPolicy,
+    /// When the noise itself is called an effect.
+    pub noise: NoisePolicy,
+    /// When a resonance is said to have moved.
+    pub resonance: ResonancePolicy,
+    /// What experiment is proposed.
+    pub proposal: ProposalPolicy,
+}
+
+impl SearchPolicy {
+    /// Refuses settings that mean nothing.
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        self.holdout.validate()?;
+        self.grid.validate()?;
+        self.ranking.validate()?;
+        self.fits.validate()?;
+        self.judgement.validate()?;
+        self.revision.validate()?;
+        self.noise.validate()?;
+        self.resonance.validate()?;
+        self.proposal.validate()
+    }
+}
+
+settings! {
+    /// Blocks of time that no fit of the search sees.
+    struct HoldoutPolicy {
+        /// Blocks of an experiment: enough of them for a standard error of their differences, few enough that
+        /// a block is longer than the noise's autocorrelation.
+        blocks: usize = 10, FROM_ONE;
+        /// Part of each stretch of time that is held out: a fifth, as in five-fold cross-validation.
+        fraction: f64 = 0.2, PART;
+        /// Part of each experiment, at its start, that is not held out: the fit finds the initial state there.
+        lead: f64 = 0.1, PART;
+        /// Where a block may lie in its stretch, in the order of preference. The middle comes first, so that
+        /// slow effects are seen on both sides; the others avoid extremes of the input. By hand.
+        places: [f64; 5] = [0.5, 0.2, 0.8, 0.35, 0.65], PART;
+    }
+
+    /// Plays and deadzones: what the declared model itself can explain is no effect.
+    struct GridPolicy {
+        /// Half-widths of a first model, and the same where the initial state is unknown and plays have to find
+        /// it. By hand: rich enough for a first model, cheap enough for a search that refines the grid later.
+        half_widths: usize = 16, FROM_ONE;
+        half_widths_in_motion: usize = 24, FROM_ONE;
+        /// Thresholds of a first model. By hand.
+        thresholds: usize = 7, FROM_ONE;
+        /// Times that plays and deadzones are added before effects are tried. By hand.
+        rounds: usize = 6, FROM_ONE;
+        /// A round that lowers the squares by less than this part is the last: another one would gain less.
+        small: f64 = 0.02, PART;
+        /// Plays and deadzones that are added at once, before they are refined together. By hand.
+        at_once: usize = 8, FROM_ONE;
+        /// A play that would take a smaller part of the squares is not added: the search asks for 40 times as much
+        /// before it names an effect.
+        least: f64 = 1e-3, PART;
+        /// Weight of a play whose column is measured by a difference: small, so that the output changes linearly,
+        /// and far above rounding.
+        probe: f64 = 1e-4, POSITIVE;
+        /// Places of plays and deadzones that are tried: more than the record can tell apart, by hand.
+        tried_plays: usize = 40, FROM_ONE;
+        tried_deadzones: usize = 32, FROM_ONE;
+        /// Tried half-widths grow with this power of their number: dense where they are small, since small loops
+        /// turn more often. By hand.
+        density: f64 = 1.5, FROM_ONE;
+        /// A threshold nearer to zero, in steps between thresholds, is the identity's. By hand.
+        near_zero: f64 = 0.1, PART;
+        /// Steps of a fit with the grids held, before they move: new weights settle first, because a fit in which
+        /// everything moves stops early at the kinks where plays begin to turn.
+        held_steps: usize = 6, FROM_ONE;
+        /// Steps with moving grids; a third of them after unused plays were dropped. By hand.
+        moving_steps: usize = 12, FROM_ONE;
+        /// Part of the squares below which a step of these fits is the last: a fortieth of what an effect must take.
+        gain: f64 = 1e-3, PART;
+    }
+
+    /// Which effects are fitted at all.
+    struct RankingPolicy {
+        /// Effects of a round that are fitted: the score test's best four. The score test ranks the right effect
+        /// first on 42 of 44 simulated records.
+        fitted: usize = 4, FROM_ONE;
+        /// An effect whose worth is a smaller part of the best one's is not fitted. By hand.
+        far_behind: f64 = 0.2, PART;
+        /// Where an effect promises this part of the squares, it is fitted before the grids are refined: the grids
+        /// would bend to what it explains. By hand.
+        strong: f64 = 0.6, PART;
+        /// Where no effect promises this part of [`JudgementPolicy::least`], none is fitted: the score test promises
+        /// too little, but hardly by more than that. By hand.
+        hopeless: f64 = 0.5, PART;
+        /// Where fits take long: the part of the best gain so far that the score test must promise. By hand.
+        near: f64 = 0.5, PART;
+        /// A slow function of time explains this part of what it does with a quarter of its knots. By hand.
+        slow: f64 = 0.75, PART;
+        /// Times as many knots as that.
+        coarser: usize = 4, FROM_ONE;
+    }
+
+    /// How far fits go.
+    struct FitPolicy {
+        /// Steps of a trial. A trial is only compared with other trials; what is found is refined at the end.
+        steps: usize = 12, FROM_ONE;
+        /// Part of the squares below which a step of a trial is the last. By hand, far below any threshold.
+        gain: f64 = 1e-5, PART;
+        /// Times that a trial goes on which is still making progress, and what that means: its last steps, so many,
+        /// lowered the squares by this part. By hand.
+        more: usize = 3, 0.0..=1e3;
+        last_steps: usize = 4, FROM_ONE;
+        progress: f64 = 0.1, PART;
+        /// Growth of the squares beyond which the score test's start is not used: its linear prediction fails there.
+        beyond: f64 = 10.0, FROM_ONE;
+        /// The same for loops with plays, where a start that is worse than none leads to another minimum.
+        beyond_with_plays: f64 = 1.0, FROM_ONE;
+        /// Steps of the last refinement with everything free, and with the grids held: everything free stops at the
+        /// kinks of plays, and creep's gain had not settled with fewer.
+        last_free_steps: usize = 15, FROM_ONE;
+        last_held_steps: usize = 30, FROM_ONE;
+        /// The last refinement ends at this factor times the usual gain, which is a tenth of what a superfluous
+        /// parameter gains on average: finer steps would fit noise.
+        coarser: f64 = 10.0, FROM_ONE;
+    }
+
+    /// Which trial is accepted, see [`judgement`](super::judgement).
+    struct JudgementPolicy {
+        /// An effect that takes a smaller part of the squares is of no practical use: 4 % of the squares are 2 % of
+        /// the rms error. By hand.
+        least: f64 = 0.04, PART;
+        /// Candidates that a round compares, all effects together: the largest of so many gains on noise must be exceeded.
+        looks: f64 = 150.0, FROM_ONE;
+        /// Gains beyond this factor times the threshold for white noise need no test against the residual's
+        /// autocorrelation, which would raise the threshold by less. It saves the covariance of long records. By hand.
+        certain: f64 = 50.0, FROM_ONE;
+        /// Squares over those of the noise up to which a model is near the noise: 1.5 times its rms. By hand.
+        near_noise: f64 = 2.25, FROM_ONE;
+        /// Part of the squares that an effect must take far from the noise, where a bad fit resembles many effects a
+        /// little, and part of the held-out squares, which varies more from block to block. By hand.
+        substantial: f64 = 0.3, PART;
+        substantial_held_out: f64 = 0.2, PART;
+        /// Part by which the held-out squares must fall at least: less is of no use, however sure. By hand.
+        confirmed: f64 = 5e-3, PART;
+        /// Standard errors of the mean difference between blocks: one-sided, 5 % for a normal number.
+        standard_errors: f64 = 1.7, 0.0..=100.0;
+        /// Or the better blocks gain so many times what the worse ones lose: an effect may show in few blocks only.
+        one_sided: f64 = 10.0, FROM_ONE;
+        /// Part of the squares that comes back when nothing drives the lags of a driven effect; else they only decay.
+        /// By hand.
+        driven: f64 = 0.5, PART;
+    }
+
+    /// When an earlier decision is changed.
+    struct RevisionPolicy {
+        /// Rounds of the search, which end one that does not end by itself. By hand.
+        rounds: usize = 12, FROM_ONE;
+        /// Part by which the squares must fall when an effect moves to the other side of the output stage. By hand.
+        other_side: f64 = 0.01, PART;
+        /// Factor by which the held-out squares may grow without a superfluous effect. The few held-out blocks
+        /// vary; the training data decide. By hand.
+        superfluous: f64 = 1.5, FROM_ONE;
+        /// Factor by which the held-out squares may grow when a driven effect replaces a slow function of time. By hand.
+        driven_instead: f64 = 1.05, FROM_ONE;
+        /// Times the steps of a trial that its fit may take: it has lost what it started from. By hand.
+        longer: usize = 2, FROM_ONE;
+        /// Factor by which the squares may grow when an effect replaces slow poles of G. By hand.
+        instead_of_lags: f64 = 1.05, FROM_ONE;
+    }
+
+    /// When the noise itself is called an effect.
+    struct NoisePolicy {
+        /// Fewer wrong samples may be noise, or come from the way in which a record was cut. By hand.
+        fewest: usize = 3, FROM_ONE;
+        /// Part of them that may follow a jump of the input: where most do, the model errs at jumps. By hand.
+        after_jumps: f64 = 0.5, PART;
+        /// Samples that follow a jump, and the part of the input's changes that are no jumps. By hand.
+        shortly: usize = 8, FROM_ONE;
+        no_jumps: f64 = 0.99, PART;
+        /// A residual so many times larger than the noise at rest comes from the stage. The factor is well above one
+        /// because slow noise shows only in part while the input rests. By hand.
+        louder: f64 = 2.5, FROM_ONE;
+        /// Where the input never rests: a residual of this part of the output's span is no sensor's noise. By hand.
+        loud: f64 = 0.02, PART;
+        /// Part by which a prediction from the residual's past must lower its standard deviation. By hand.
+        predicted: f64 = 0.1, PART;
+        /// Fourth moment over the square of the second. Stationary Gaussian noise has 3 whatever its
+        /// autocorrelation, and what comes in bursts while the stage moves has more. By hand.
+        kurtosis: f64 = 3.8, FROM_ONE;
+    }
+
+    /// When a resonance is said to have moved.
+    struct ResonancePolicy {
+        /// Largest over smallest output amplitude (rms): experiments nearer to each other tell nothing. By hand.
+        apart: f64 = 1.25, FROM_ONE;
+        /// Standard deviations by which the frequencies must differ: beyond doubt, since the sentence rules a cause out.
+        sure: f64 = 5.0, 0.0..=100.0;
+        /// Steps of the fit to each experiment, and the part of the squares below which a step is the last. By hand.
+        steps: usize = 8, FROM_ONE;
+        gain: f64 = 1e-4, PART;
+    }
+
+    /// What experiment is proposed.
+    struct ProposalPolicy {
+        /// Seconds of it, long enough for creep, and the most samples, few enough to be handled. By hand.
+        seconds: f64 = 600.0, POSITIVE;
+        samples: f64 = 1e6, FROM_ONE;
+        /// Periods of a triangle in that time. By hand.
+        periods: f64 = 20.0, POSITIVE;
+    }
+}
+
+/// Numerical limits of the score test, which no result should depend on.
+pub(super) mod score {
+    /// Eigenvalues of the model's scaled Gram matrix below this part of the largest are rounding.
+    pub(in crate::explain) const RANK: f64 = 1e-11;
+    /// Eigenvalues of a candidate's scaled Gram matrix below this are not solved for: the projection has cost digits.
+    pub(in crate::explain) const OWN_RANK: f64 = 1e-9;
+    /// A column of which the projection leaves a smaller part is in the span of the model's sensitivities.
+    pub(in crate::explain) const LEFT: f64 = 1e-7;
+    /// Numbers that the columns held at once may take: 96 MB.
+    pub(in crate::explain) const AT_ONCE: usize = 12_000_000;
+    /// Probes beyond which all derivatives together take less time than single simulations. By hand.
+    pub(in crate::explain) const MANY: usize = 50;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn todays_settings_are_valid() {
+        SearchPolicy::default().validate().unwrap();
+    }
+
+    #[test]
+    fn nonsense_is_refused_by_name() {
+        let refused = |change: fn(&mut SearchPolicy)| {
+            let mut policy = SearchPolicy::default();
+            change(&mut policy);
+            policy.validate().unwrap_err().to_string()
+        };
+        assert!(refused(|p| p.judgement.least = -0.1).contains("least"));
+        assert!(refused(|p| p.judgement.near_noise = 0.5).contains("near_noise"));
+        assert!(refused(|p| p.judgement.looks = f64::NAN).contains("NaN"));
+        assert!(refused(|p| p.holdout.fraction = 1.5).contains("between 0 and 1"));
+        assert!(refused(|p| p.holdout.places[2] = 2.0).contains("places"));
+        assert!(refused(|p| p.holdout.blocks = 0).contains("blocks"));
+        assert!(refused(|p| p.grid.probe = 0.0).contains("probe"));
+        assert!(refused(|p| p.ranking.fitted = 0).contains("fitted"));
+        assert!(refused(|p| p.fits.steps = 0).contains("steps"));
+        assert!(refused(|p| p.revision.superfluous = 0.9).contains("superfluous"));
+        assert!(refused(|p| p.noise.loud = f64::INFINITY).contains("loud"));
+        assert!(refused(|p| p.resonance.sure = -1.0).contains("sure"));
+    }
+}

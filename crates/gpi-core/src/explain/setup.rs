@@ -1,0 +1,96 @@
+//! What never changes during a search.
+
+use super::blocks::complement;
+use super::policy::SearchPolicy;
+use crate::chain::point::Point;
+use crate::chain::table::Table;
+use crate::effects::{CATALOGUE, Entry};
+use crate::fit::minimize::FitOptions;
+use crate::fit::preparation::Prepared;
+use crate::fit::refine::{RefineOptions, settings};
+use crate::fit::representatives::representatives;
+use crate::spectrum::is_one_sine;
+use crate::{Error, Record};
+
+/// What a search is given.
+pub(super) struct SearchSetup {
+    /// The prepared record as it was measured, wrong samples included.
+    pub measured: Record,
+    /// The record in which the samples are scored that the training holds out.
+    pub test: Record,
+    /// How trials are fitted, the grids held.
+    pub options: FitOptions,
+    /// The same with all grids free that were not given.
+    pub moving_grids: FitOptions,
+    /// Which grids may move and become finer.
+    pub moving: RefineOptions,
+    /// The effects that may be added.
+    pub allowed: Vec<&'static Entry>,
+    /// Whether the order of G or its delay was given, so that more of it is an effect.
+    pub order_is_given: bool,
+    /// Whether the record is one cycle that repeats.
+    pub is_one_sine: bool,
+    /// The tolerances.
+    pub policy: SearchPolicy,
+}
+
+impl SearchSetup {
+    /// For a prepared record with the weights of its outputs.
+    pub(super) fn new(
+        prepared: &Prepared,
+        weights: &[f64],
+        measured: Record,
+        allowed: Vec<&'static Entry>,
+        order_is_given: bool,
+        moving: RefineOptions,
+        policy: SearchPolicy,
+    ) -> Result<Self, Error> {
+        let options = |free: &RefineOptions, gain: f64| {
+            let mut options = settings(prepared, free, policy.fits.steps);
+            options.loss.scales = weights.to_vec();
+            FitOptions { gain, ..options }
+        };
+        Ok(Self {
+            measured,
+            test: complement(&prepared.record)?,
+            options: options(&RefineOptions::default(), policy.fits.gain),
+            moving_grids: options(&moving, policy.grid.gain),
+            moving,
+            allowed,
+            order_is_given,
+            is_one_sine: is_one_sine(&prepared.record),
+            policy,
+        })
+    }
+
+    /// How many unknowns a point has.
+    pub(super) fn unknowns(&self, point: &Point) -> usize {
+        Table::new(point, self.options.freedom).len
+    }
+
+    /// Whether derivatives of the whole record would take long.
+    pub(super) fn is_long(&self, point: &Point) -> bool {
+        representatives(point, &self.measured, self.unknowns(point)).is_some()
+    }
+
+    /// Root mean square of what is held out, from its squares.
+    pub(super) fn holdout_rms(&self, held_out: &[f64]) -> f64 {
+        let values = self.test.scored() * self.test.outputs().len();
+        (held_out.iter().sum::<f64>() / values.max(1) as f64).sqrt()
+    }
+}
+
+/// The entries that `names` allow, all when there are none.
+pub(super) fn allowed(
+    parameter: &'static str,
+    names: Option<&[String]>,
+) -> Result<Vec<&'static Entry>, Error> {
+    let Some(names) = names else { return Ok(CATALOGUE.iter().collect()) };
+    let find = |name: &String| {
+        CATALOGUE.iter().find(|entry| entry.name == name).ok_or_else(|| {
+            let known: Vec<&str> = CATALOGUE.iter().map(|entry| entry.name).collect();
+            Error::parameter(parameter, name, format!("one of {}", known.join(", ")))
+        })
+    };
+    names.iter().map(find).collect()
+}

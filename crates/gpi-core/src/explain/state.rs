@@ -1,0 +1,189 @@
+//! The state of a search: the model so far, its squares, and what was added to it.
+
+use super::repair::{everything, repaired};
+use super::setup::SearchSetup;
+use crate::chain::point::Point;
+use crate::effects::{Effect, Entry};
+use crate::fit::minimize::{FitOptions, Fitted, fit};
+use crate::fit::preparation::Prepared;
+use crate::fit::refine::Refined;
+use crate::identify::NoiseFloor;
+use crate::progress::Progress;
+use crate::uncertainty::outliers;
+use crate::{Error, Record};
+
+/// What a fit with one more effect brought.
+#[derive(Clone)]
+pub(super) struct Trial {
+    /// The effect.
+    pub entry: &'static Entry,
+    /// The model with it.
+    pub point: Point,
+    /// Its training squares.
+    pub cost: f64,
+    /// `N ln(squares before / squares after)`, less what the same fit gains without the effect where more is free
+    /// than in the fit before.
+    pub deviance: f64,
+    /// The significance threshold of the deviance.
+    pub threshold: f64,
+    /// Squares of what is held out, block by block.
+    pub held_out: Vec<f64>,
+    /// The part of the residual's squares that the score test promised.
+    pub promised: f64,
+    /// Whether the input makes it explain what it does, where it is an effect that the input drives.
+    pub is_driven: bool,
+}
+
+/// An effect that was tried and not taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rejected {
+    /// The effect.
+    pub effect: &'static str,
+    /// Root mean square error with it on the held-out blocks.
+    pub holdout_rms: f64,
+    /// Why it was not taken.
+    pub why: String,
+    /// Effects that explain the same.
+    pub confounded_with: Vec<&'static str>,
+}
+
+/// An effect that was added.
+#[derive(Clone)]
+pub(super) struct Addition {
+    /// What its fit brought.
+    pub trial: Trial,
+    /// What was tried in the same round.
+    pub others: Vec<Rejected>,
+    /// Earlier effects that this one made superfluous.
+    pub dropped: Vec<&'static str>,
+}
+
+/// The model before slow poles were taken out of its G.
+pub(super) struct BeforeLags {
+    pub point: Point,
+    pub cost: f64,
+    /// Effects that had been added.
+    pub additions: usize,
+}
+
+/// The state of a search.
+pub(super) struct SearchState<'a> {
+    /// What never changes.
+    pub setup: &'a SearchSetup,
+    /// What fits start from; wrong samples of its record are replaced.
+    pub prepared: Prepared<'a>,
+    /// The model so far.
+    pub point: Point,
+    /// Its training squares.
+    pub cost: f64,
+    /// Whether the grids were refined since the latest effect.
+    pub is_rich: bool,
+    /// What to go back to where no effect explains what slow poles of G did.
+    pub before_lags: Option<BeforeLags>,
+    /// What was added.
+    pub additions: Vec<Addition>,
+    /// Isolated wrong samples, `[experiment][output]`.
+    pub wrong: Vec<Vec<Vec<usize>>>,
+    /// What was tried in the last round and not taken.
+    pub last: Vec<Rejected>,
+}
+
+impl<'a> SearchState<'a> {
+    /// From a refined base model.
+    pub(super) fn new(setup: &'a SearchSetup, prepared: Prepared<'a>, refined: &Refined) -> Self {
+        Self {
+            setup,
+            prepared,
+            point: refined.fitted.point.clone(),
+            cost: refined.fitted.linearization.cost,
+            is_rich: false,
+            before_lags: None,
+            additions: Vec::new(),
+            wrong: Vec::new(),
+            last: Vec::new(),
+        }
+    }
+
+    /// Fits a point to the training data.
+    pub(super) fn fit(
+        &self,
+        point: Point,
+        options: &FitOptions,
+        stage: &str,
+        progress: Progress,
+    ) -> Result<Fitted, Error> {
+        fit(point, &self.prepared.record, options, stage, progress)
+    }
+
+    /// Whether the model has an effect.
+    pub(super) fn has(&self, entry: &Entry) -> bool {
+        self.point.effects.iter().any(|effect| effect.name() == entry.name)
+    }
+
+    /// Whether it is more of an effect that the input drives and that the model has already: no new name.
+    pub(super) fn is_more(&self, entry: &Entry) -> bool {
+        entry.driven && self.has(entry)
+    }
+
+    /// Whether every effect of a point has parameters that a machine can have.
+    pub(super) fn is_plausible(&self, point: &Point) -> bool {
+        let record = &self.prepared.record;
+        let longest = record.experiments().iter().map(|e| e.input.nrows()).max();
+        let duration = longest.unwrap_or(0) as f64 / record.rate();
+        let blocks = point.blocks();
+        blocks.iter().filter_map(Effect::block).all(|block| block.is_plausible(duration))
+    }
+
+    /// Training squares of a point.
+    pub(super) fn training_squares(&self, point: &Point) -> Result<f64, Error> {
+        Ok(self.squares(point, &self.prepared.record)?.iter().sum())
+    }
+
+    /// Squares of every held-out block.
+    pub(super) fn held_out(&self, point: &Point) -> Result<Vec<f64>, Error> {
+        self.squares(point, &self.setup.test)
+    }
+
+    /// Squares of every run that `scored` scores.
+    fn squares(&self, point: &Point, scored: &Record) -> Result<Vec<f64>, Error> {
+        // run over the training record, whose initial states were fitted
+        let residuals = point.residuals(&self.prepared.record)?;
+        let weights = &self.setup.options.loss.scales;
+        let mut sums = Vec::new();
+        for (residual, experiment) in residuals.iter().zip(scored.experiments()) {
+            for run in experiment.scored_rows(residual) {
+                let columns = run.column_iter().zip(weights);
+                sums.push(columns.map(|(c, w)| w * w * c.norm_squared()).sum());
+            }
+        }
+        Ok(sums)
+    }
+
+    /// The training squares that noise alone would leave.
+    pub(super) fn noise_squares(&self) -> Result<f64, Error> {
+        let record = &self.prepared.record;
+        let noise = NoiseFloor::estimate(record, &self.point.residuals(record)?);
+        let weights = &self.setup.options.loss.scales;
+        let squares = noise.rms.iter().zip(weights).map(|(rms, weight)| (rms * weight).powi(2));
+        Ok(squares.sum::<f64>() * record.scored() as f64)
+    }
+
+    /// Remembers what led to the point.
+    pub(super) fn add(&mut self, addition: Addition) -> Result<(), Error> {
+        self.additions.push(addition);
+        self.repair()
+    }
+
+    /// Finds isolated outliers of the residual and replaces them, also where the record is held out: a wrong sample
+    /// is no evidence on a model.
+    ///
+    /// Each time from what was measured: samples that an effect explains are no longer outliers once it is added.
+    pub(super) fn repair(&mut self) -> Result<(), Error> {
+        let residuals = self.point.residuals(&self.setup.measured)?;
+        self.wrong = outliers::places(&residuals, &everything(&self.setup.measured)?, 0);
+        self.prepared.record = repaired(&self.setup.measured, &residuals, &self.wrong)?;
+        // what the next fits are compared with
+        self.cost = self.training_squares(&self.point)?;
+        Ok(())
+    }
+}
