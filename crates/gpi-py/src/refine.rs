@@ -30,7 +30,7 @@ pub(crate) struct Refinement {
 impl Refinement {
     /// (outputs, inputs).
     fn shape(&self) -> (usize, usize) {
-        self.refinement.shape()
+        self.refinement.bands.shape()
     }
 }
 
@@ -132,7 +132,7 @@ impl Refinement {
     ///     The poles, and the standard deviations of their real parts (in the real part) and imaginary parts (in the
     ///     imaginary part); no unit.
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let poles = self.refinement.poles().map_err(to_python)?;
+        let poles = self.refinement.bands.poles().map_err(to_python)?;
         Ok((from_complex(py, poles.poles), from_complex(py, poles.deviations)))
     }
 
@@ -148,7 +148,7 @@ impl Refinement {
     /// ndarray, shape (outputs, inputs, count)
     ///     In output units per unit of v.
     fn markov_std<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyAny>> {
-        let deviations = self.refinement.markov_deviations(count).map_err(to_python)?;
+        let deviations = self.refinement.bands.markov_deviations(count).map_err(to_python)?;
         Ok(from_matrices(py, self.shape(), &deviations))
     }
 
@@ -170,7 +170,7 @@ impl Refinement {
         let py = angles.py();
         let angles = vector("angles", angles)?;
         let found =
-            py.detach(|| self.refinement.response_deviations(&angles)).map_err(to_python)?;
+            py.detach(|| self.refinement.bands.response_deviations(&angles)).map_err(to_python)?;
         let stack = |part: fn(&core::ResponseDeviation) -> &Matrix| {
             let values: Vec<Matrix> = found.iter().map(|at| part(at).clone()).collect();
             from_matrices(py, self.shape(), &values).call_method1("transpose", (2, 0, 1))
@@ -191,7 +191,7 @@ impl Refinement {
     ///     In the unit of v.
     fn loop_std<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (input, one_dimensional) = signal("u", u)?;
-        let found = self.refinement.loop_deviations(&input).map_err(to_python)?;
+        let found = self.refinement.bands.loop_deviations(&input).map_err(to_python)?;
         Ok(from_signal(u.py(), found, one_dimensional))
     }
 
