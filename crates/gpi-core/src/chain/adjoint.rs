@@ -84,7 +84,7 @@ fn descent_of(
 
 /// The chain backwards in time: what the cost makes of a change at each place.
 struct Back<'a> {
-    sections: &'a [Section],
+    sections: Vec<Section>,
     /// Rows of C by outputs, columns of B by inputs.
     c: Vec<Vec<f64>>,
     b: Vec<Vec<f64>>,
@@ -110,10 +110,11 @@ impl<'a> Back<'a> {
     fn new(point: &'a Point, places: &'a Places, signals: usize, warmup: usize) -> Self {
         let dynamics = &point.dynamics;
         let loops: Vec<&InnerLoop> = point.loops().collect();
-        let (c, b) = by_states(&dynamics.sections, dynamics.outputs(), dynamics.inputs());
+        let sections = point.sections();
+        let (c, b) = by_states(&sections, dynamics.outputs(), dynamics.inputs());
         let sensed = sensed(point);
         Self {
-            sections: &dynamics.sections,
+            sections,
             c,
             b,
             d: &dynamics.d,
@@ -123,8 +124,8 @@ impl<'a> Back<'a> {
             sensed,
             places,
             warmup,
-            x: vec![0.0; dynamics.order()],
-            start: vec![0.0; dynamics.order()],
+            x: vec![0.0; point.order()],
+            start: vec![0.0; point.order()],
             met: Matrix::zeros(places.len, signals),
         }
     }
@@ -183,7 +184,7 @@ impl<'a> Back<'a> {
             work[place] += dot(&inner.drives, &self.x);
         }
         let mut first = 0;
-        for section in self.sections {
+        for section in &self.sections {
             let x = &mut self.x[first..first + section.order()];
             match (&section.a[..], x) {
                 ([a1, a2], [x1, x2]) => (*x1, *x2) = (-a1 * *x1 - a2 * *x2, *x1),
@@ -247,7 +248,7 @@ impl<'a> Back<'a> {
     fn stand(&mut self, work: &mut [f64]) {
         let Places { v, states, .. } = self.places;
         let mut first = 0;
-        for section in self.sections {
+        for section in &self.sections {
             let order = section.order();
             let standing = section.standing(&Matrix::identity(order, order));
             let said = standing.tr_mul(&DVector::from_column_slice(&self.x[first..first + order]));

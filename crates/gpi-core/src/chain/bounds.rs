@@ -57,24 +57,14 @@ impl Point {
                 let limits = limits.map(|((low, high), value)| (low - value, high - value));
                 limits.map(|limits| if freedom.weights { limits } else { HELD }).collect()
             }
-            Group::Denominator { section } => {
-                let own = &self.dynamics.sections[section];
-                match (own.beside, &values[..]) {
-                    (Some(effect), [a1]) => {
-                        let own = self.effects[effect].place().parallel_sections();
-                        let (low, high) = own.map_or(FREE, |own| own.section_bounds(self.rate));
-                        vec![(low - a1, high - a1)]
-                    }
-                    _ => vec![FREE; values.len()],
+            Group::ParallelDenominator { place, .. } => match values[..] {
+                [a1] => {
+                    let own = self.effects[place].place().parallel_sections();
+                    let (low, high) = own.map_or(FREE, |own| own.section_bounds(self.rate));
+                    vec![(low - a1, high - a1)]
                 }
-            }
-            Group::Numerator { section } => {
-                let own = &self.dynamics.sections[section];
-                // one input drives the sections of an effect
-                let input = own.beside.and_then(|effect| self.effects[effect].place().input());
-                let is_other = |place: usize| input.is_some_and(|i| i != place / own.order());
-                (0..values.len()).map(|place| held(is_other(place))).collect()
-            }
+                _ => vec![FREE; values.len()],
+            },
             Group::Observer { section } => {
                 let reference = self.dynamics.sections[section].reference;
                 let output = |place: usize| place % self.dynamics.outputs();
@@ -87,9 +77,12 @@ impl Point {
                 };
                 values.iter().enumerate().map(side).collect()
             }
-            Group::Offsets { .. } | Group::Feedthrough { .. } | Group::State { .. } => {
-                vec![FREE; values.len()]
-            }
+            Group::Denominator { .. }
+            | Group::Numerator { .. }
+            | Group::ParallelNumerator { .. }
+            | Group::Feedthrough { .. }
+            | Group::Offsets { .. }
+            | Group::State { .. } => vec![FREE; values.len()],
         }
     }
 

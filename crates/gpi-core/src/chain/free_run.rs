@@ -7,15 +7,13 @@ use crate::chain::stream::hats;
 use crate::effects::{Added, ClosedLoops, Effect, InnerLoop, Moment, Place, PlayCurves, Stage};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};
-use nalgebra::{DVector, RowDVector};
+use nalgebra::RowDVector;
 use rayon::prelude::*;
 
 impl Point {
     /// Other dynamics, which stood still before the record.
     pub(crate) fn replace_dynamics(&mut self, dynamics: Sections) {
-        for past in &mut self.pasts {
-            past.state = DVector::zeros(dynamics.order());
-        }
+        self.splice_states(0..self.dynamics.order(), &vec![0.0; dynamics.order()]);
         self.dynamics = dynamics;
     }
 
@@ -315,7 +313,7 @@ impl Point {
         let (inputs, outputs) = (given.inputs().to_vec(), given.outputs().to_vec());
         let rest = self.mean_offsets(record);
         let offsets = means.iter().zip(rest.iter()).map(|(mean, rest)| mean + rest);
-        let linear = self.dynamics.own().to_state_space()?;
+        let linear = self.dynamics.to_state_space()?;
         let model =
             Model::new(given.rate(), inputs, outputs, hysteresis?, linear, offsets.collect())?;
         model.with_effects(self.blocks())

@@ -59,7 +59,7 @@ impl Signals {
         let columns = hysteresis.iter().map(|own| take(own.len)).collect();
         let reading = point.play_curves().map(|curves| curves.values().len());
         let readings = reading.map(&mut take).collect();
-        let states = take(point.dynamics.order());
+        let states = take(point.order());
         let loops = point.loops().map(|inner| take(1 + inner.law.stops())).collect();
         Self { columns, hysteresis, readings, states, loops, len }
     }
@@ -75,7 +75,7 @@ impl Places {
         let loops = point.loops().count();
         let (v, y) = (take(point.channels.len()), take(point.dynamics.outputs()));
         let (z, w) = (take(loops), take(loops));
-        let states = take(point.dynamics.order());
+        let states = take(point.order());
         let half_widths = point.loops().map(|inner| take(inner.law.stops())).collect();
         Self { v, y, z, w, states, half_widths, len }
     }
@@ -126,6 +126,20 @@ impl Entries<'_> {
             Group::Denominator { section } => self.denominator(section, unknowns),
             Group::Numerator { section } => self.numerator(section, unknowns),
             Group::Observer { section } => self.observer(section, unknowns),
+            Group::ParallelDenominator { place, section } => {
+                let (first, _) = self.parallel(place, section);
+                let (state, place) = (self.signals.states.start, self.places.states.start);
+                for (j, unknown) in unknowns.enumerate() {
+                    self.add(unknown, place + first + j, state + first, -1.0);
+                }
+            }
+            Group::ParallelNumerator { place, section } => {
+                let (first, input) = self.parallel(place, section);
+                let (v, place) = (self.v(input), self.places.states.start);
+                for (j, unknown) in unknowns.enumerate() {
+                    self.add(unknown, place + first + j, v, 1.0);
+                }
+            }
             Group::Feedthrough { input, output } => {
                 self.add(unknowns.start, self.places.y.start + output, self.v(input), 1.0);
             }
@@ -147,15 +161,21 @@ impl Entries<'_> {
         }
     }
 
-    /// The first state of a section, and what the held DC gains take back through D: input, output, the steady
-    /// states for an input of one (order, inputs), and the DC gains from its states (outputs, order). A section in
-    /// parallel with G is no part of the held gains.
+    /// The first state of an effect's section, and the input that drives it.
+    fn parallel(&self, place: usize, section: usize) -> (usize, usize) {
+        let effect = self.point.effects[place].place();
+        let sections = effect.parallel_sections().map(|own| own.sections(self.point.rate));
+        let before = sections.iter().flatten().take(section).map(|(a, _)| a.len()).sum::<usize>();
+        (self.point.states_before(place) + before, effect.input().unwrap_or(0))
+    }
+
+    /// The first state of a section of G, and what the held DC gains take back through D: input, output, the steady
+    /// states for an input of one (order, inputs), and the DC gains from its states (outputs, order).
     fn section(&self, section: usize) -> (usize, Vec<(usize, usize)>, Matrix, Matrix) {
         let dynamics = &self.point.dynamics;
         let own = &dynamics.sections[section];
         let first = dynamics.sections[..section].iter().map(Section::order).sum();
-        let held = dynamics.held.iter().map(|held| held.0).enumerate();
-        let held = held.filter(|_| own.beside.is_none()).collect();
+        let held = dynamics.held.iter().map(|held| held.0).enumerate().collect();
         let gain = &own.c * own.standing(&Matrix::identity(own.order(), own.order()));
         (first, held, own.standing(&own.b), gain)
     }

@@ -1,4 +1,4 @@
-//! G with what stands beside it and in its loops, sample by sample.
+//! G with its loops and the sections in parallel, sample by sample.
 
 use crate::chain::point::Point;
 use crate::effects::InnerLoop;
@@ -6,7 +6,7 @@ use crate::linear::{Section, advance};
 
 /// The linear dynamics of a point in motion.
 pub(crate) struct Motion<'a> {
-    sections: &'a [Section],
+    sections: Vec<Section>,
     /// Columns of B by inputs, of C by states, rows of D by outputs, one after the other.
     b: Vec<Vec<f64>>,
     c: Vec<f64>,
@@ -40,21 +40,21 @@ impl<'a> Motion<'a> {
             marks: vec![0.0; inner.law.marks()],
             places: vec![0.0; inner.law.stops()],
         };
-        let sections = &point.dynamics.sections;
+        let sections = point.sections();
         let column = |input: usize| {
             let own = sections.iter().map(|section| section.b.column(input).into_owned());
             own.flat_map(|column| column.data.as_vec().clone()).collect()
         };
         Self {
-            sections,
             b: (0..point.dynamics.inputs()).map(column).collect(),
             c: sections.iter().flat_map(|section| section.c.as_slice()).copied().collect(),
             d: point.dynamics.d.transpose().as_slice().to_vec(),
-            drive: vec![0.0; point.dynamics.order()],
+            drive: vec![0.0; point.order()],
             circulating: loops.iter().map(rest).collect(),
             loops,
-            state: vec![0.0; point.dynamics.order()],
+            state: vec![0.0; point.order()],
             displacement: vec![0.0; point.dynamics.outputs()],
+            sections,
         }
     }
 
@@ -91,7 +91,7 @@ impl<'a> Motion<'a> {
             driven.for_each(|(sum, drive)| *sum += drive * value);
         }
         let mut first = 0;
-        for section in self.sections {
+        for section in &self.sections {
             let own = first..first + section.order();
             let drive = &self.drive[own.clone()];
             advance(&section.a, &mut self.state[own.clone()], |j| drive[j]);

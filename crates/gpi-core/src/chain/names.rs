@@ -25,6 +25,12 @@ fn name(group: Group, place: usize, point: &Point, record: &Record) -> String {
         thresholds.iter().filter(|&&eta| eta < thresholds[place]).count()
     };
     let order = |section: usize| point.dynamics.sections[section].order();
+    // sections in parallel with G are numbered after its own
+    let number = |effect: usize, section: usize| {
+        let parallel = point.effects[..effect].iter().filter_map(|e| e.place().parallel_sections());
+        let before: usize = parallel.map(|own| own.sections(point.rate).len()).sum();
+        point.dynamics.sections.len() + before + section
+    };
     let outputs = point.dynamics.outputs();
     match group {
         Group::Weights { input } => format!("{}.weights[{place}]", u(input)),
@@ -38,6 +44,13 @@ fn name(group: Group, place: usize, point: &Point, record: &Record) -> String {
         }
         Group::Observer { section } => {
             format!("section[{section}].c{}[{}]", place / outputs + 1, y(place % outputs))
+        }
+        Group::ParallelDenominator { place: effect, section } => {
+            format!("section[{}].a{}", number(effect, section), place + 1)
+        }
+        Group::ParallelNumerator { place: effect, section } => {
+            let input = point.effects[effect].place().input().unwrap_or(0);
+            format!("section[{}].b{}[{}]", number(effect, section), place + 1, u(input))
         }
         Group::Feedthrough { input, output } => {
             format!("feedthrough[{}, {}]", y(output), u(input))

@@ -2,9 +2,10 @@
 
 use crate::Matrix;
 use crate::chain::hysteresis::{Derivatives, Parameters};
-use crate::effects::{Effect, OutputStage, PlaceMut};
-use crate::linear::Sections;
+use crate::effects::{Coefficients, Effect, OutputStage, PlaceMut};
+use crate::linear::{Section, Sections};
 use nalgebra::DVector;
+use std::ops::Range;
 
 /// What was before the first sample of an experiment.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +15,7 @@ pub(crate) struct Past {
     pub plays: Option<Vec<Vec<f64>>>,
     /// Whether the experiment began in motion, so that `state` is to be fitted.
     pub moving: bool,
-    /// By how much the state of the sections at the first scored sample differs from that of an
+    /// By how much the state of all [`Point::sections`] at the first scored sample differs from that of an
     /// actuator that stood still before the record.
     pub state: DVector<f64>,
 }
@@ -24,9 +25,8 @@ pub(crate) struct Past {
 pub(crate) struct Point {
     /// One hysteresis an input.
     pub channels: Vec<Parameters>,
-    /// G, and beside it the sections of effects.
     pub dynamics: Sections,
-    /// In the order of the chain. Values of those that are sections stand in `dynamics`.
+    /// In the order of the chain.
     pub effects: Vec<Effect>,
     /// Sampling rate in Hz.
     pub rate: f64,
@@ -60,65 +60,91 @@ pub(crate) struct Freedom {
 }
 
 impl Point {
+    /// Everything linear that v drives: the sections of G, then those of effects in parallel with G.
+    pub(crate) fn sections(&self) -> Vec<Section> {
+        let shape = self.dynamics.d.shape();
+        let parallel = self.effects.iter().filter_map(|effect| effect.place().parallel_sections());
+        let parallel = parallel.flat_map(|own| {
+            let one = move |coefficients| Section::from_one_input(coefficients, own.input(), shape);
+            own.sections(self.rate).into_iter().map(one)
+        });
+        self.dynamics.sections.iter().cloned().chain(parallel).collect()
+    }
+
+    /// The states of all sections.
+    pub(crate) fn order(&self) -> usize {
+        self.states_before(self.effects.len())
+    }
+
+    /// The states of G and of the effects before a place.
+    pub(crate) fn states_before(&self, place: usize) -> usize {
+        let states = |effect| orders(effect, self.rate).iter().sum::<usize>();
+        self.dynamics.order() + self.effects[..place].iter().map(states).sum::<usize>()
+    }
+
+    /// The sections of an effect are changed.
+    pub(crate) fn change_sections(
+        &mut self,
+        place: usize,
+        change: impl FnOnce(&mut Vec<Coefficients>),
+    ) {
+        let rate = self.rate;
+        if let PlaceMut::Parallel(own) = self.effects[place].place_mut() {
+            let mut sections = own.sections(rate);
+            change(&mut sections);
+            own.set_sections(&sections, rate);
+        }
+    }
+
     /// The point with one more effect, in its place of the chain.
     pub(crate) fn with_effect(&self, effect: Effect) -> Self {
         let mut point = self.clone();
         let place = point.effects.partition_point(|other| other.stage() <= effect.stage());
-        let parallel = effect.place().parallel_sections();
-        let parallel = parallel.map(|own| (own.input(), own.sections(point.rate)));
-        let (input, sections) = parallel.unwrap_or_default();
+        let (first, count) = (self.states_before(place), orders(&effect, self.rate).iter().sum());
         point.effects.insert(place, effect);
-        for section in &mut point.dynamics.sections {
-            section.beside = section.beside.map(|own| if own >= place { own + 1 } else { own });
-        }
-        for (a, b) in sections {
-            let order = a.len();
-            point.dynamics.push_beside(place, input, a, &b);
-            for past in &mut point.pasts {
-                past.state = past.state.clone().resize_vertically(past.state.len() + order, 0.0);
-            }
-        }
+        point.splice_states(first..first, &vec![0.0; count]);
         point
     }
 
     /// The point without one of its effects.
     pub(crate) fn without_effect(&self, place: usize) -> Self {
         let mut point = self.clone();
+        point.splice_states(self.states_before(place)..self.states_before(place + 1), &[]);
         point.effects.remove(place);
-        let kept: Vec<bool> =
-            self.dynamics.sections.iter().map(|section| section.beside != Some(place)).collect();
-        let states: Vec<bool> = self
-            .dynamics
-            .sections
-            .iter()
-            .zip(&kept)
-            .flat_map(|(section, &kept)| std::iter::repeat_n(kept, section.order()))
-            .collect();
-        let mut flags = kept.iter();
-        point.dynamics.sections.retain(|_| *flags.next().unwrap_or(&true));
-        for section in &mut point.dynamics.sections {
-            section.beside = section.beside.map(|own| if own > place { own - 1 } else { own });
-        }
-        for past in &mut point.pasts {
-            let left = past.state.iter().zip(&states).filter(|(_, kept)| **kept);
-            past.state = DVector::from_vec(left.map(|(value, _)| *value).collect());
-        }
         point
     }
 
-    /// The effects, with the values that stand in the dynamics.
+    /// The point with the sections of an effect as a part of G.
+    pub(crate) fn with_effect_in_dynamics(&self, place: usize) -> Self {
+        let mut point = self.without_effect(place);
+        let (own, effects) = (self.dynamics.order(), self.states_before(place));
+        for (past, before) in point.pasts.iter_mut().zip(&self.pasts) {
+            let states = &before.state.as_slice()[effects..self.states_before(place + 1)];
+            let mut all = past.state.as_slice().to_vec();
+            all.splice(own..own, states.iter().copied());
+            past.state = DVector::from_vec(all);
+        }
+        let first: usize = self.effects[..place].iter().map(|e| orders(e, self.rate).len()).sum();
+        let first = self.dynamics.sections.len() + first;
+        let count = orders(&self.effects[place], self.rate).len();
+        point.dynamics.sections.extend(self.sections().drain(first..first + count));
+        point
+    }
+
+    pub(super) fn splice_states(&mut self, range: Range<usize>, values: &[f64]) {
+        for past in &mut self.pasts {
+            let mut all = past.state.as_slice().to_vec();
+            all.splice(range.clone(), values.iter().copied());
+            past.state = DVector::from_vec(all);
+        }
+    }
+
+    /// The effects as a model has them: with the dead time of G.
     pub(crate) fn blocks(&self) -> Vec<Effect> {
         let mut effects = self.effects.clone();
-        for (place, effect) in effects.iter_mut().enumerate() {
-            let PlaceMut::Parallel(effect) = effect.place_mut() else { continue };
-            let input = effect.input();
-            let own = self.dynamics.sections.iter().filter(|s| s.beside == Some(place));
-            let sections: Vec<_> = own
-                .map(|s| (s.a.clone(), s.b.column(input).iter().copied().collect::<Vec<_>>()))
-                .collect();
-            if !sections.is_empty() {
-                let dead_time = self.dynamics.delay;
-                effect.set_sections(&sections, dead_time, self.rate);
+        for effect in &mut effects {
+            if let PlaceMut::Parallel(own) = effect.place_mut() {
+                own.set_dead_time(self.dynamics.delay);
             }
         }
         effects
@@ -128,4 +154,10 @@ impl Point {
     pub(crate) fn output_stages(&self) -> impl Iterator<Item = &dyn OutputStage> {
         self.effects.iter().filter_map(|effect| effect.place().output_stage())
     }
+}
+
+/// The orders of the sections of an effect.
+fn orders(effect: &Effect, rate: f64) -> Vec<usize> {
+    let sections = effect.place().parallel_sections().map(|own| own.sections(rate));
+    sections.unwrap_or_default().iter().map(|(a, _)| a.len()).collect()
 }

@@ -6,6 +6,8 @@
 //! is therefore a walk over the rows of the [`Table`].
 
 use super::point::{DynamicsFreedom, Freedom, Point};
+use crate::effects::Coefficients;
+use crate::linear::move_poles;
 use nalgebra::DVector;
 use std::ops::Range;
 
@@ -38,6 +40,16 @@ pub(crate) enum Group {
     Observer {
         section: usize,
     },
+    /// a of a section of an effect in parallel with G.
+    ParallelDenominator {
+        place: usize,
+        section: usize,
+    },
+    /// b of the same; one input drives it.
+    ParallelNumerator {
+        place: usize,
+        section: usize,
+    },
     /// One element of D.
     Feedthrough {
         input: usize,
@@ -63,8 +75,8 @@ pub(crate) enum Group {
 }
 
 use Group::{
-    Denominator, Effect, Feedthrough, HalfWidths, Numerator, Observer, Offsets, Plays, Slopes,
-    State, Thresholds, Weights,
+    Denominator, Effect, Feedthrough, HalfWidths, Numerator, Observer, Offsets,
+    ParallelDenominator, ParallelNumerator, Plays, Slopes, State, Thresholds, Weights,
 };
 
 /// The unknowns of a fit: the groups that are free, and where each stands in a step.
@@ -129,6 +141,12 @@ fn groups(point: &Point) -> Vec<Group> {
     for section in 0..point.dynamics.sections.len() {
         all.extend([Denominator { section }, Numerator { section }, Observer { section }]);
     }
+    for place in 0..point.effects.len() {
+        for section in 0..sections(point, place).len() {
+            all.push(ParallelDenominator { place, section });
+            all.push(ParallelNumerator { place, section });
+        }
+    }
     for input in inputs.clone() {
         all.extend(outputs.clone().map(|output| Feedthrough { input, output }));
     }
@@ -141,6 +159,12 @@ fn groups(point: &Point) -> Vec<Group> {
     all
 }
 
+/// The sections of an effect.
+fn sections(point: &Point, place: usize) -> Vec<Coefficients> {
+    let own = point.effects[place].place().parallel_sections();
+    own.map_or_else(Vec::new, |own| own.sections(point.rate))
+}
+
 impl Group {
     fn is_free(self, point: &Point, freedom: Freedom) -> bool {
         let Freedom { derivatives, dynamics, .. } = freedom;
@@ -148,8 +172,10 @@ impl Group {
             Weights { .. } | Slopes { .. } | Offsets { .. } => true,
             Thresholds { .. } => derivatives.thresholds,
             HalfWidths { .. } => derivatives.half_widths,
-            Denominator { .. } => dynamics == DynamicsFreedom::Everything,
-            Numerator { .. } => dynamics != DynamicsFreedom::Nothing,
+            Denominator { .. } | ParallelDenominator { .. } => {
+                dynamics == DynamicsFreedom::Everything
+            }
+            Numerator { .. } | ParallelNumerator { .. } => dynamics != DynamicsFreedom::Nothing,
             Observer { .. } => dynamics != DynamicsFreedom::Nothing && point.dynamics.outputs() > 1,
             // the held DC gain sets one element of each column
             Feedthrough { input, output } => {
@@ -173,6 +199,8 @@ impl Group {
             Denominator { section } => point.dynamics.sections[section].a.clone(),
             Numerator { section } => point.dynamics.sections[section].b.as_slice().to_vec(),
             Observer { section } => point.dynamics.sections[section].c.as_slice().to_vec(),
+            ParallelDenominator { place, section } => sections(point, place).swap_remove(section).0,
+            ParallelNumerator { place, section } => sections(point, place).swap_remove(section).1,
             Feedthrough { input, output } => vec![point.dynamics.d[(output, input)]],
             Effect { place } => point.effects[place].values(),
             Offsets { experiment } => point.offsets[experiment].as_slice().to_vec(),
@@ -199,9 +227,15 @@ impl Group {
             Slopes { input } => add(&mut point.channels[input].slopes),
             Thresholds { input } => add(&mut point.channels[input].thresholds),
             HalfWidths { input } => add(&mut point.channels[input].half_widths),
-            Denominator { section } => point.dynamics.sections[section].move_poles(change),
+            Denominator { section } => move_poles(&mut point.dynamics.sections[section].a, change),
             Numerator { section } => add(point.dynamics.sections[section].b.as_mut_slice()),
             Observer { section } => add(point.dynamics.sections[section].c.as_mut_slice()),
+            ParallelDenominator { place, section } => {
+                point.change_sections(place, |all| move_poles(&mut all[section].0, change));
+            }
+            ParallelNumerator { place, section } => {
+                point.change_sections(place, |all| add(&mut all[section].1));
+            }
             Feedthrough { input, output } => point.dynamics.d[(output, input)] += change[0],
             Effect { place } => {
                 let mut values = self.read(point);

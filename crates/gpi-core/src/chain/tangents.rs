@@ -30,7 +30,7 @@ pub(crate) struct Trace {
 
 /// Everything linear that a change runs through.
 pub(crate) struct Tangents<'a> {
-    sections: &'a [Section],
+    sections: Vec<Section>,
     /// Rows of C, then of S of all loops.
     seen: Weights,
     /// Columns of B and of E.
@@ -78,6 +78,7 @@ impl<'a> Tangents<'a> {
     ) -> Self {
         let places = Places::new(point);
         let dynamics = &point.dynamics;
+        let all_sections = point.sections();
         let mut all = injections(point, table, index, &signals, &places).into_iter().peekable();
         let loops: Vec<&InnerLoop> = point.loops().collect();
         let plays = loops.iter().map(|inner| inner.law.stops()).sum();
@@ -98,7 +99,7 @@ impl<'a> Tangents<'a> {
             let entered = injections.iter().filter(|one| places.states.contains(&one.place));
             let entered = entered.map(|one| one.place - places.states.start);
             let moved: Vec<usize> = entered.chain(starts.iter().map(|(_, state)| *state)).collect();
-            let (sections, states) = moving(&dynamics.sections, &moved, everything);
+            let (sections, states) = moving(&all_sections, &moved, everything);
             Tile {
                 first,
                 injections,
@@ -106,7 +107,7 @@ impl<'a> Tangents<'a> {
                 drives,
                 sections,
                 states,
-                x: vec![NONE; dynamics.order()],
+                x: vec![NONE; point.order()],
                 held: vec![NONE; sensed.len()],
                 plays: vec![NONE; plays],
                 work: vec![NONE; places.len],
@@ -114,8 +115,8 @@ impl<'a> Tangents<'a> {
             }
         };
         let tiles: Vec<Tile> = (0..table.len).step_by(LANES).map(tile).collect();
-        let (c, b) = by_states(&dynamics.sections, dynamics.outputs(), dynamics.inputs());
-        let none = vec![0.0; dynamics.order()];
+        let (c, b) = by_states(&all_sections, dynamics.outputs(), dynamics.inputs());
+        let none = vec![0.0; point.order()];
         let sees = |inner: &&'a InnerLoop| match &inner.sees {
             Sees::Output(_) => &none[..],
             Sees::Mixture { states, .. } => states,
@@ -125,7 +126,6 @@ impl<'a> Tangents<'a> {
         let seen = c.iter().map(Vec::as_slice).chain(loops.iter().map(sees));
         let drives: Vec<&[f64]> = loops.iter().map(|inner| &inner.drives[..]).collect();
         Self {
-            sections: &dynamics.sections,
             seen: Weights::new(&seen.collect::<Vec<_>>()),
             driven: rows(&b),
             circulating: Weights::new(&drives),
@@ -136,6 +136,7 @@ impl<'a> Tangents<'a> {
             signals,
             places,
             warmup: experiment.warmup,
+            sections: all_sections,
         }
     }
 
@@ -262,7 +263,7 @@ impl<'a> Tangents<'a> {
     fn stand(&self, tile: &mut Tile) {
         let Places { v, states, .. } = &self.places;
         let mut first = 0;
-        for section in self.sections {
+        for section in &self.sections {
             let order = section.order();
             let drive = Matrix::from_fn(order, LANES, |j, lane| {
                 let driven = v.clone().enumerate();

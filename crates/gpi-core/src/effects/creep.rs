@@ -118,8 +118,11 @@ impl ParallelSections for Creep {
         self.time_constants.iter().zip(&self.gains).map(lag).collect()
     }
 
-    fn set_sections(&mut self, sections: &[Coefficients], dead_time: usize, rate: f64) {
-        self.dead_time = dead_time;
+    fn set_dead_time(&mut self, samples: usize) {
+        self.dead_time = samples;
+    }
+
+    fn set_sections(&mut self, sections: &[Coefficients], rate: f64) {
         for (i, (a, b)) in sections.iter().enumerate() {
             let pole = -a[0];
             self.time_constants[i] = -1.0 / (rate * pole.ln());

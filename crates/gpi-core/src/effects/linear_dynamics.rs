@@ -107,8 +107,11 @@ impl ParallelSections for LinearDynamics {
         vec![(self.denominator.clone(), self.numerator.clone())]
     }
 
-    fn set_sections(&mut self, sections: &[Coefficients], dead_time: usize, _: f64) {
-        self.dead_time = dead_time;
+    fn set_dead_time(&mut self, samples: usize) {
+        self.dead_time = samples;
+    }
+
+    fn set_sections(&mut self, sections: &[Coefficients], _: f64) {
         (self.denominator, self.numerator) = sections[0].clone();
     }
 

@@ -93,7 +93,7 @@ impl<'a> Base<'a> {
             intermediates: &select(|signals| &signals.intermediate),
             displacements: &select(|signals| &signals.displacement),
             residuals: &self.residuals,
-            dynamics: &self.point.dynamics.own(),
+            dynamics: &self.point.dynamics,
             loops: self.point.loops().collect(),
             widest: widest.collect(),
         })

@@ -80,14 +80,12 @@ fn resonances(
     let uncertainty = refined.uncertainty(&record, progress)?;
     let rate = record.rate();
     let frequencies = |point: &Point| -> Vec<f64> {
-        let own = point.dynamics.own();
-        let sections = own.sections.iter();
+        let sections = point.dynamics.sections.iter();
         sections.map(|section| section.poles()[0].arg().abs() * rate / TAU).collect()
     };
     let deviations = uncertainty
         .spread(&table.values(&point), |step| Ok(frequencies(&point.moved(step, &table))))?;
-    let own = point.dynamics.own();
-    let found = frequencies(&point).into_iter().zip(deviations).zip(&own.sections);
+    let found = frequencies(&point).into_iter().zip(deviations).zip(&point.dynamics.sections);
     let resonance = |((frequency, deviation), section): ((f64, f64), &Section)| {
         let resonates = section.order() == 2 && section.poles()[0].im != 0.0;
         resonates.then_some(Resonance { swing, frequency, deviation })

@@ -124,14 +124,7 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
 pub(super) fn join_modes(point: &mut Point) {
     let joins = |effect: &Effect| effect.entry().free_order == FreeOrder::JoinsG;
     while let Some(place) = point.effects.iter().position(joins) {
-        for section in &mut point.dynamics.sections {
-            section.beside = match section.beside {
-                Some(own) if own == place => None,
-                Some(own) if own > place => Some(own - 1),
-                other => other,
-            };
-        }
-        point.effects.remove(place);
+        *point = point.with_effect_in_dynamics(place);
     }
     rescale(point);
 }

@@ -12,7 +12,6 @@ use crate::chain::point::Point;
 use crate::effects::{ClosedLoops, Entry, Stage};
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::fit::refine::Refined;
-use crate::linear::Section;
 use crate::optimize::Status;
 
 /// Fits candidates; where fits take long, only those that may come near the best so far.
@@ -132,14 +131,14 @@ pub(super) fn measured(
 /// Whether it is the input that makes the lags beside G explain what they do: those whose initial state is unknown
 /// also decay from it, and that is a function of time.
 fn is_driven(state: &SearchState, without: &Point, with: &Point) -> Result<bool, Error> {
-    let is_beside = |own: &Section| own.beside.is_some();
     let moves = with.pasts.iter().any(|past| past.moving);
-    if !moves || !with.dynamics.sections.iter().any(is_beside) {
+    if !moves || with.order() == with.dynamics.order() {
         return Ok(true);
     }
     let mut undriven = with.clone();
-    let beside = undriven.dynamics.sections.iter_mut().filter(|own| is_beside(own));
-    beside.for_each(|own| own.b.fill(0.0));
+    for place in 0..with.effects.len() {
+        undriven.change_sections(place, |all| all.iter_mut().for_each(|(_, b)| b.fill(0.0)));
+    }
     let squares = |point| state.training_squares(point);
     Ok(squares(&undriven)? > state.setup.policy.judgement.driven * squares(without)?)
 }

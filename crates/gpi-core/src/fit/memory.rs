@@ -5,7 +5,7 @@ use crate::effects::longest_lag;
 use crate::fit::preparation::rescale;
 use crate::linear::Sections;
 use crate::{Error, Record};
-use nalgebra::{Complex, DVector};
+use nalgebra::Complex;
 
 /// The longest memory of a mechanical stage's dynamics, in samples.
 pub(crate) struct Memory {
@@ -40,27 +40,18 @@ impl Point {
         &self,
         unwanted: impl Fn(&Complex<f64>) -> bool,
     ) -> Result<Option<Self>, Error> {
-        let own = self.dynamics.own();
-        // what acts back drives the states of G as they are
+        let own = &self.dynamics;
+        // loops act on the states of G, which would be others
         if !own.poles().iter().any(&unwanted) || self.loops().next().is_some() {
             return Ok(None);
         }
-        let mut sections = Sections::from_delayed_state_space(&own.to_state_space()?)?;
-        sections.sections.retain(|section| !section.poles().iter().all(&unwanted));
-        if sections.sections.is_empty() || sections.poles().iter().any(unwanted) {
+        let mut dynamics = Sections::from_delayed_state_space(&own.to_state_space()?)?;
+        dynamics.sections.retain(|section| !section.poles().iter().all(&unwanted));
+        if dynamics.sections.is_empty() || dynamics.poles().iter().any(unwanted) {
             return Ok(None);
         }
-        let order = sections.order();
-        let beside = self.dynamics.sections.iter().filter(|section| section.beside.is_some());
-        sections.sections.extend(beside.cloned());
         let mut point = self.clone();
-        for past in &mut point.pasts {
-            let kept = past.state.len() - own.order();
-            let states = past.state.rows(own.order(), kept).into_owned();
-            past.state = DVector::zeros(order + kept);
-            past.state.rows_mut(order, kept).copy_from(&states);
-        }
-        point.dynamics = sections;
+        point.replace_dynamics(dynamics);
         rescale(&mut point);
         Ok(Some(point))
     }

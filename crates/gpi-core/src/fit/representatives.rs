@@ -2,6 +2,7 @@
 
 use crate::chain::point::Point;
 use crate::chain::table::{Group, Table};
+use crate::linear::Section;
 use crate::{Error, Experiment, Matrix, Record};
 
 /// Chosen experiments, and how much of the record they are.
@@ -58,7 +59,12 @@ pub(crate) fn representatives(
         |(number, index): (usize, usize)| (index, experiments[index].part(number % parts, parts));
     let chosen: Vec<(usize, Experiment)> = chosen.into_iter().enumerate().map(part).collect();
     let own: usize = chosen.iter().map(|(_, own)| own.scored()).sum();
-    let slowest = point.dynamics.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    let slowest = point
+        .sections()
+        .iter()
+        .flat_map(Section::poles)
+        .map(|pole| pole.norm())
+        .fold(0.0, f64::max);
     // to one percent, and no longer than what is scored
     let memory = (0.01_f64.ln() / slowest.min(1.0 - 1e-9).ln()).ceil().max(0.0);
     Some(Representatives {

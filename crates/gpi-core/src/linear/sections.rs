@@ -2,28 +2,10 @@
 
 use super::StateSpace;
 use super::decompose::{eigen, solve};
+use super::section::Section;
 use crate::{Error, Matrix};
 use nalgebra::DVector;
 use num_complex::Complex64;
-
-/// One or two states in observer form:
-/// `x1+ = -a1 x1 + x2 + b1 v`, `x2+ = -a2 x1 + b2 v`, seen by the reference output as x1.
-///
-/// Two real poles and a conjugate pair are the same two numbers a1, a2, so that a fit can pass from
-/// one to the other.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Section {
-    /// The denominator `z^order + a1 z^(order-1) + ..`.
-    pub a: Vec<f64>,
-    /// (order, inputs).
-    pub b: Matrix,
-    /// (outputs, order); the reference output's row is 1, 0.
-    pub c: Matrix,
-    /// The output that fixes the states' scale.
-    pub reference: usize,
-    /// The effect whose section it is; it then stands beside G and is no part of the held DC gain.
-    pub beside: Option<usize>,
-}
 
 /// `G(z) = z^-delay (D + sum of sections)`, each column of G held to a DC gain by D.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,118 +16,6 @@ pub(crate) struct Sections {
     pub d: Matrix,
     /// For each input: the output at which the DC gain is held, and that gain.
     pub held: Vec<(usize, f64)>,
-}
-
-/// Moves the state of a section in observer form on by one sample, with what drives each of its states.
-pub(crate) fn advance(a: &[f64], state: &mut [f64], driven: impl Fn(usize) -> f64) {
-    match (a, state) {
-        ([a1, a2], [x1, x2]) => {
-            (*x1, *x2) = (*x2 - a1 * *x1 + driven(0), driven(1) - a2 * *x1);
-        }
-        (a, state) => state[0] = driven(0) - a[0] * state[0],
-    }
-}
-
-impl Section {
-    pub(crate) fn order(&self) -> usize {
-        self.a.len()
-    }
-
-    /// A, (order, order).
-    pub(crate) fn matrix(&self) -> Matrix {
-        match self.a[..] {
-            [a1, a2] => Matrix::from_row_slice(2, 2, &[-a1, 1.0, -a2, 0.0]),
-            _ => Matrix::from_element(1, 1, -self.a[0]),
-        }
-    }
-
-    /// The state that a constant drive of each unknown (order, n) leads to: `(I - A)^-1 drive`.
-    pub(crate) fn standing(&self, drive: &Matrix) -> Matrix {
-        let mut states = drive.clone();
-        match self.a[..] {
-            [a1, a2] => {
-                for mut column in states.column_iter_mut() {
-                    let x1 = (column[0] + column[1]) / (1.0 + a1 + a2);
-                    (column[0], column[1]) = (x1, column[1] - a2 * x1);
-                }
-            }
-            _ => states /= 1.0 + self.a[0],
-        }
-        states
-    }
-
-    /// Whether all poles lie inside a circle slightly smaller than the unit circle.
-    pub(crate) fn is_stable(&self) -> bool {
-        /// Poles beyond have a memory of more than 10^7 samples.
-        const MARGIN: f64 = 1e-7;
-        match self.a[..] {
-            [a1, a2] => a2 < 1.0 - MARGIN && 1.0 + a1 + a2 > MARGIN && 1.0 - a1 + a2 > MARGIN,
-            _ => self.a[0].abs() < 1.0 - MARGIN,
-        }
-    }
-
-    /// Adds a change of a, or as much of it as keeps the section stable.
-    pub(crate) fn move_poles(&mut self, change: &[f64]) {
-        /// Smallest part of the change that is tried; below, the section stays as it is.
-        const LEAST: f64 = 1e-6;
-        let before = self.a.clone();
-        let mut fraction = 1.0;
-        while fraction >= LEAST {
-            let values = self.a.iter_mut().zip(&before).zip(change);
-            values.for_each(|((a, before), change)| *a = before + fraction * change);
-            if self.is_stable() {
-                return;
-            }
-            fraction *= 0.5;
-        }
-        self.a = before;
-    }
-
-    pub(crate) fn poles(&self) -> Vec<Complex64> {
-        match self.a[..] {
-            [a1, a2] => {
-                let root = Complex64::new(0.25 * a1 * a1 - a2, 0.0).sqrt();
-                vec![-0.5 * a1 + root, -0.5 * a1 - root]
-            }
-            _ => vec![Complex64::new(-self.a[0], 0.0)],
-        }
-    }
-
-    /// The section with poles `poles` and residues `seen` (outputs, poles) times `driven` (poles,
-    /// inputs); the first `references` outputs may fix the states' scale.
-    fn from_poles(
-        poles: &[Complex64],
-        seen: &ComplexMatrix,
-        driven: &ComplexMatrix,
-        references: usize,
-    ) -> Self {
-        let (outputs, order) = seen.shape();
-        let size = |output: usize| seen.row(output).iter().map(|c| c.norm()).product::<f64>();
-        let reference = (0..references).max_by(|&i, &j| size(i).total_cmp(&size(j))).unwrap_or(0);
-        let real = |matrix: ComplexMatrix| matrix.map(|value| value.re);
-        if let [pole] = *poles {
-            let scale = seen[(reference, 0)];
-            let c = real(seen.map(|value| value / scale));
-            return Self { a: vec![-pole.re], b: real(driven * scale), c, reference, beside: None };
-        }
-        let (first, second) = (poles[0], poles[1]);
-        let a = vec![-(first + second).re, (first * second).re];
-        let row = seen.row(reference);
-        let to_observer = ComplexMatrix::from_row_slice(
-            2,
-            2,
-            &[row[0], row[1], -row[0] * second, -row[1] * first],
-        );
-        let b = real(&to_observer * driven);
-        let mut c = Matrix::zeros(outputs, order);
-        if outputs > 1
-            && let Some(c_transposed) = solve(to_observer.transpose(), &seen.transpose())
-        {
-            c = real(c_transposed.transpose());
-        }
-        c.set_row(reference, &nalgebra::RowDVector::from_vec(vec![1.0, 0.0]));
-        Self { a, b, c, reference, beside: None }
-    }
 }
 
 type ComplexMatrix = nalgebra::DMatrix<Complex64>;
@@ -165,7 +35,7 @@ impl Sections {
         for output in 0..outputs {
             let c = Matrix::from_fn(outputs, 1, |row, _| f64::from(u8::from(row == output)));
             let b = (1.0 - pole) * lagged.d.rows(output, 1);
-            lagged.sections.push(Section { a: vec![-pole], b, c, reference: output, beside: None });
+            lagged.sections.push(Section { a: vec![-pole], b, c, reference: output });
         }
         lagged
     }
@@ -249,17 +119,9 @@ impl Sections {
         self.sections.iter().flat_map(Section::poles).collect()
     }
 
-    /// G(1), (outputs, inputs), without what stands beside G.
+    /// G(1), (outputs, inputs).
     pub(crate) fn dc_gain(&self) -> Matrix {
-        let own = self.sections.iter().filter(|section| section.beside.is_none());
-        own.fold(self.d.clone(), |sum, s| sum + &s.c * s.standing(&s.b))
-    }
-
-    /// G alone.
-    pub(crate) fn own(&self) -> Self {
-        let mut own = self.clone();
-        own.sections.retain(|section| section.beside.is_none());
-        own
+        self.sections.iter().fold(self.d.clone(), |sum, s| sum + &s.c * s.standing(&s.b))
     }
 
     /// C, (outputs, order).
@@ -271,16 +133,6 @@ impl Sections {
             first += section.order();
         }
         c
-    }
-
-    /// Adds first- or second-order sections with denominator `a` and numerator `b` from one input to all
-    /// outputs, as those of the effect `beside`.
-    pub(crate) fn push_beside(&mut self, beside: usize, input: usize, a: Vec<f64>, b: &[f64]) {
-        let mut c = Matrix::zeros(self.outputs(), a.len());
-        c[(0, 0)] = 1.0;
-        let mut drive = Matrix::zeros(a.len(), self.inputs());
-        drive.column_mut(input).copy_from_slice(b);
-        self.sections.push(Section { a, b: drive, c, reference: 0, beside: Some(beside) });
     }
 
     /// G(e^jw) at w radians per sample, (outputs, inputs).

@@ -79,9 +79,9 @@ impl Bands {
     /// The covariance's decomposition does not converge.
     pub fn poles(&self) -> Result<PoleDeviations, Error> {
         let parts = |poles: Vec<Complex64>| poles.iter().flat_map(|p| [p.re, p.im]).collect();
-        let deviations = self.spread(|point| Ok(parts(point.dynamics.own().poles())))?;
+        let deviations = self.spread(|point| Ok(parts(point.dynamics.poles())))?;
         let pairs = deviations.chunks_exact(2).map(|pair| Complex64::new(pair[0], pair[1]));
-        let poles = self.point.dynamics.own().poles();
+        let poles = self.point.dynamics.poles();
         let mut deviations: Vec<Complex64> = pairs.collect();
         deviations.resize(poles.len(), Complex64::new(0.0, 0.0));
         Ok(PoleDeviations { poles, deviations })
@@ -94,7 +94,7 @@ impl Bands {
     pub fn markov_deviations(&self, count: usize) -> Result<Vec<Matrix>, Error> {
         let (outputs, inputs) = self.point.dynamics.d.shape();
         let deviations = self.spread(|point| {
-            let markov = point.dynamics.own().to_state_space()?.markov(count);
+            let markov = point.dynamics.to_state_space()?.markov(count);
             Ok(markov.iter().flat_map(|tap| tap.iter().copied().collect::<Vec<_>>()).collect())
         })?;
         if deviations.is_empty() {
@@ -116,11 +116,11 @@ impl Bands {
         let responses = |dynamics: &Sections| -> Vec<DMatrix<Complex64>> {
             frequencies.iter().map(|&frequency| dynamics.response(frequency)).collect()
         };
-        let here = responses(&self.point.dynamics.own());
+        let here = responses(&self.point.dynamics);
         // relative to the response itself: the logarithm's real part is the magnitude, the imaginary
         // one the phase, without a branch to cross
         let deviations = self.spread(|point| {
-            let moved = responses(&point.dynamics.own());
+            let moved = responses(&point.dynamics);
             let pairs = moved.iter().zip(&here).flat_map(|(moved, here)| {
                 let ratios = moved.iter().zip(here.iter()).map(|(a, b)| (a / b).ln());
                 ratios.flat_map(|ratio| [ratio.re, ratio.im]).collect::<Vec<_>>()

@@ -17,8 +17,11 @@ pub trait ParallelSections: Block {
     /// The sections at a sampling rate in Hz. The values of the block follow from them.
     fn sections(&self, rate: f64) -> Vec<Coefficients>;
 
-    /// Takes estimated sections, and the dead time of G in samples, which they share.
-    fn set_sections(&mut self, sections: &[Coefficients], dead_time: usize, rate: f64);
+    /// Takes the dead time of G in samples, which the sections share.
+    fn set_dead_time(&mut self, samples: usize);
+
+    /// Takes estimated sections, as many as it has.
+    fn set_sections(&mut self, sections: &[Coefficients], rate: f64);
 
     /// Smallest and largest a1 of the first-order sections.
     fn section_bounds(&self, _rate: f64) -> (f64, f64) {
