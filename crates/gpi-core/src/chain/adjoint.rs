@@ -1,11 +1,12 @@
 //! The gradient of the cost by all unknowns at once: one pass through an experiment, and one back.
 
 use super::injections::{Injection, Places, injections};
+use super::motion::{advance_adjoint, columns, rows};
 use super::point::{Freedom, Point};
 use super::stream::Stream;
 use super::table::{Group, Table};
-use super::tangents::{Trace, by_states, sensed};
-use crate::effects::{InnerLoop, Law, Sees, Slope};
+use super::tangents::{Trace, sensed};
+use crate::effects::{InnerLoop, Sees, Slope};
 use crate::linear::{Section, dot};
 use crate::optimize::Loss;
 use crate::{Error, Experiment, Matrix, Record};
@@ -111,12 +112,12 @@ impl<'a> Back<'a> {
         let dynamics = &point.dynamics;
         let loops: Vec<&InnerLoop> = point.loops().collect();
         let sections = point.sections();
-        let (c, b) = by_states(&sections, dynamics.outputs(), dynamics.inputs());
+        let (outputs, inputs) = dynamics.d.shape();
         let sensed = sensed(point);
         Self {
+            c: rows(&sections, outputs),
+            b: columns(&sections, inputs),
             sections,
-            c,
-            b,
             d: &dynamics.d,
             plays: vec![0.0; loops.iter().map(|inner| inner.law.stops()).sum()],
             loops,
@@ -164,12 +165,7 @@ impl<'a> Back<'a> {
     fn sense(&mut self, work: &mut [f64], slopes: &[Slope]) {
         let stages = self.sensed.iter().zip(slopes).zip(&mut self.held);
         for ((&output, slope), held) in stages.rev() {
-            let row = &mut work[self.places.y.start + output];
-            let said = *row + *held;
-            (*row, *held) = match slope {
-                Slope::Times(factor) => (factor * said, 0.0),
-                Slope::Held => (0.0, said),
-            };
+            slope.adjoint(&mut work[self.places.y.start + output], held);
         }
     }
 
@@ -185,11 +181,7 @@ impl<'a> Back<'a> {
         }
         let mut first = 0;
         for section in &self.sections {
-            let x = &mut self.x[first..first + section.order()];
-            match (&section.a[..], x) {
-                ([a1, a2], [x1, x2]) => (*x1, *x2) = (-a1 * *x1 - a2 * *x2, *x1),
-                (a, x) => x[0] *= -a[0],
-            }
+            advance_adjoint(&section.a, &mut self.x[first..first + section.order()]);
             first += section.order();
         }
     }
@@ -202,24 +194,8 @@ impl<'a> Back<'a> {
             let (own, others) = marks.split_at(inner.law.marks());
             let (places, rest) = plays.split_at_mut(inner.law.stops());
             let around = work[w.start + number];
-            let mut said = 0.0;
-            match &inner.law {
-                Law::Power { .. } => said += own[0] * around,
-                Law::Stops { weights, .. } => {
-                    let widths = &mut work[half_widths[number].clone()];
-                    for (((weight, &mark), place), width) in
-                        weights.iter().zip(own).zip(places).zip(widths)
-                    {
-                        said += weight * around;
-                        *place -= weight * around;
-                        if mark != 0.0 {
-                            said += *place;
-                            *width = -mark * *place;
-                            *place = 0.0;
-                        }
-                    }
-                }
-            }
+            let widths = &mut work[half_widths[number].clone()];
+            let said = inner.law.adjoint(around, widths, own, places);
             work[z.start + number] = said;
             match &inner.sees {
                 Sees::Output(output) => work[y.start + output] += said,

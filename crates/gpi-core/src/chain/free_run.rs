@@ -1,45 +1,40 @@
-//! A point run free over the record, stage by stage, and the model that it is.
+//! A point run free over a record, and the model that it is.
 
-use crate::chain::hysteresis::{Beside, Parameters};
-use crate::chain::motion::Motion;
-use crate::chain::point::{Past, Point};
-use crate::chain::stream::hats;
-use crate::effects::{Added, ClosedLoops, Effect, InnerLoop, Moment, Place, PlayCurves, Stage};
+use super::motion::Motion;
+use super::plays::Plays;
+use super::point::{Past, Point};
+use super::stages::Stages;
+use super::stream::hats;
+use crate::chain::hysteresis::Parameters;
+use crate::effects::{ClosedLoops, InnerLoop, PlayCurves, Stage};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::RowDVector;
 use rayon::prelude::*;
 
 impl Point {
-    /// Other dynamics, which stood still before the record.
+    /// Other dynamics, which were in steady state before the record.
     pub(crate) fn replace_dynamics(&mut self, dynamics: Sections) {
         self.splice_states(0..self.dynamics.order(), &vec![0.0; dynamics.order()]);
         self.dynamics = dynamics;
     }
 
-    /// Effects on the plays of an input.
-    pub(crate) fn beside(&self, input: usize) -> Beside<'_> {
-        let widths = self.effects.iter().filter_map(|effect| effect.place().play_widths());
-        let widths = widths.filter(|own| own.input() == input);
-        let curves = self.play_curves().filter(|own| own.input() == input);
-        Beside::new(widths, curves, self.rate)
+    /// The stages before the hysteresis and after the dynamics.
+    pub(crate) fn stages(&self) -> Stages<'_> {
+        Stages { effects: &self.effects, rate: self.rate, first: 0 }
+    }
+
+    /// The plays of an input at rest, with the effects on them.
+    pub(crate) fn plays(&self, input: usize) -> Plays<'_> {
+        self.channels[input].plays(&self.effects, input, self.rate)
     }
 
     /// The drive (samples, inputs) that reaches the hysteresis.
     pub(crate) fn drive(&self, experiment: &Experiment) -> Matrix {
         let mut drive = experiment.input.clone();
-        for effect in self.effects.iter().filter_map(|effect| effect.place().input_stage()) {
-            let mut column = drive.column_mut(effect.input());
-            let mut state = effect.rest(column[0]);
-            for value in column.iter_mut() {
-                *value = effect.drive(&mut state, *value, self.rate);
-            }
-        }
+        let stages = self.stages();
+        stages.drive(&mut stages.memories(), &mut drive);
         drive
-    }
-
-    pub(crate) fn moment<'a>(&self, k: usize, covariates: &'a [f64]) -> Moment<'a> {
-        Moment { time: k as f64 / self.rate, rate: self.rate, covariates }
     }
 
     /// The intermediate signals v (samples, inputs) of a drive.
@@ -48,7 +43,7 @@ impl Point {
         let columns = v.as_mut_slice().chunks_exact_mut(drive.nrows());
         for ((input, channel), column) in self.channels.iter().enumerate().zip(columns) {
             let start = past.plays.as_ref().map(|plays| &plays[input][..]);
-            channel.apply(start, self.beside(input), column);
+            channel.apply(start, self.plays(input), column);
         }
         v
     }
@@ -90,78 +85,9 @@ impl Point {
         self.effects.iter().filter_map(|effect| effect.place().play_curves())
     }
 
-    /// Derivatives of v by the values of all curves through which plays are read, (values, samples) each.
-    pub(crate) fn reading_slopes(&self, drive: &Matrix, past: &Past) -> Vec<Matrix> {
-        self.play_curves().map(|curves| self.reading_slopes_of(curves, drive, past)).collect()
-    }
-
-    /// The same of one effect.
-    fn reading_slopes_of(&self, curves: &dyn PlayCurves, drive: &Matrix, past: &Past) -> Matrix {
-        let input = curves.input();
-        let start = past.plays.as_ref().map(|plays| &plays[input][..]);
-        let drive: Vec<f64> = drive.column(input).iter().copied().collect();
-        self.channels[input].reading_slopes(start, self.beside(input), &drive, curves)
-    }
-
-    /// Takes a displacement (samples, outputs) through the output stage.
-    pub(crate) fn sense(&self, displacement: &mut Matrix) {
-        for effect in self.output_stages() {
-            let mut column = displacement.column_mut(effect.output());
-            let mut state = effect.rest(column[0]);
-            for (k, value) in column.iter_mut().enumerate() {
-                *value = effect.sense(&mut state, *value, self.moment(k, &[])).0;
-            }
-        }
-    }
-
-    /// Adds what the input does not drive, to the displacement or to the reading.
-    pub(crate) fn add(&self, stage: Stage, experiment: &Experiment, output: &mut Matrix) {
-        for effect in self.effects.iter().filter(|effect| effect.stage() == stage) {
-            if let Place::Added(own) = effect.place() {
-                self.add_one(own, experiment, 1.0, output);
-            }
-        }
-    }
-
-    /// Adds one signal, so many times.
-    fn add_one(&self, added: &dyn Added, experiment: &Experiment, times: f64, output: &mut Matrix) {
-        let rows = experiment.covariates.transpose();
-        let covariates = |k: usize| {
-            let width = rows.nrows();
-            &rows.as_slice()[k * width..(k + 1) * width]
-        };
-        let mut state = added.rest(self.moment(0, covariates(0)));
-        for (k, value) in output.column_mut(added.output()).iter_mut().enumerate() {
-            *value += times * added.add(&mut state, self.moment(k, covariates(k)));
-        }
-    }
-
     /// Whether the model has an output stage.
     pub(crate) fn senses(&self) -> bool {
         self.output_stages().next().is_some()
-    }
-
-    /// The signal that an effect adds to the reading as it is, whatever the rest of the model does.
-    fn apart<'a>(&self, effect: &'a Effect) -> Option<&'a dyn Added> {
-        effect.place().added().filter(|added| !added.moves_stage() || !self.senses())
-    }
-
-    /// What the output gains by a block beside this point's own; `here` is the output.
-    pub(crate) fn gained_by(
-        &self,
-        effect: &Effect,
-        known: &Signals,
-        here: &Matrix,
-        experiment: &Experiment,
-        index: usize,
-    ) -> Result<Matrix, Error> {
-        if let Some(added) = self.apart(effect) {
-            let mut gained = Matrix::zeros(here.nrows(), here.ncols());
-            self.add_one(added, experiment, 1.0, &mut gained);
-            return Ok(gained);
-        }
-        let point = self.with_effect(effect.clone());
-        Ok(point.output_from(effect.stage(), known, experiment, index)? - here)
     }
 
     /// The signals along the chain.
@@ -194,78 +120,9 @@ impl Point {
             Stage::Dynamics => self.displacement(&known.intermediate, experiment, past)?,
             _ => known.displacement.clone(),
         };
-        self.add(Stage::Displaced, experiment, &mut output);
-        self.sense(&mut output);
-        self.add(Stage::Added, experiment, &mut output);
+        let stages = self.stages();
+        stages.read(&mut stages.memories(), &experiment.covariates, &mut output);
         Ok(output)
-    }
-
-    /// Derivatives of the output by the values of every effect whose own do not stream along: `[effect][value]`,
-    /// (samples, outputs), from differences.
-    pub(crate) fn effect_columns(
-        &self,
-        experiment: &Experiment,
-        index: usize,
-    ) -> Result<Vec<Vec<Matrix>>, Error> {
-        let streams =
-            |effect: &Effect| matches!(effect.place(), Place::Curves(_) | Place::Loops(_));
-        if self.effects.iter().all(streams) {
-            return Ok(vec![Vec::new(); self.effects.len()]);
-        }
-        let known = self.signals(experiment, index)?;
-        let here = self.output_from(Stage::Added, &known, experiment, index)?;
-        let of = |(place, effect): (usize, &Effect)| {
-            if streams(effect) {
-                return Ok(Vec::new());
-            }
-            self.columns_of(place, &known, &here, experiment, index)
-        };
-        self.effects.iter().enumerate().map(of).collect()
-    }
-
-    /// The same of one effect; `here` is the output.
-    pub(crate) fn columns_of(
-        &self,
-        place: usize,
-        known: &Signals,
-        here: &Matrix,
-        experiment: &Experiment,
-        index: usize,
-    ) -> Result<Vec<Matrix>, Error> {
-        let effect = &self.effects[place];
-        let Some(block) = effect.block() else { return Ok(Vec::new()) };
-        if let Place::Parallel(_) = effect.place() {
-            return Ok(Vec::new());
-        }
-        let steps = block.steps();
-        if let Place::Curves(curves) = effect.place() {
-            let input = curves.input();
-            let slopes = self.reading_slopes_of(curves, &known.drive, &self.pasts[index]);
-            let column = |(step, slope): (f64, nalgebra::RowDVector<f64>)| {
-                let mut moved = known.clone();
-                moved.intermediate.column_mut(input).axpy(step, &slope.transpose(), 1.0);
-                let there = self.output_from(Stage::Dynamics, &moved, experiment, index)?;
-                Ok((there - here) / step)
-            };
-            let rows = slopes.row_iter().map(nalgebra::Matrix::into_owned);
-            return steps.into_iter().zip(rows).map(column).collect();
-        }
-        let column = |(number, step): (usize, f64)| {
-            let mut values = block.values();
-            values[number] += step;
-            let mut moved = self.clone();
-            moved.effects[place].set(&values);
-            let apart = self.apart(&moved.effects[place]).zip(self.apart(effect));
-            if let Some((changed, own)) = apart {
-                let mut column = Matrix::zeros(here.nrows(), here.ncols());
-                self.add_one(changed, experiment, 1.0 / step, &mut column);
-                self.add_one(own, experiment, -1.0 / step, &mut column);
-                return Ok(column);
-            }
-            let there = moved.output_from(effect.stage(), known, experiment, index)?;
-            Ok((there - here) / step)
-        };
-        steps.into_iter().enumerate().map(column).collect()
     }
 
     /// Measured minus simulated outputs of each experiment, (samples, outputs), warm-ups included.

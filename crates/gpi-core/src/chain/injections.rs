@@ -1,7 +1,7 @@
 //! Where a change of each unknown enters the chain behind the hysteresis.
 
-use super::hysteresis::{Columns, Derivatives};
 use super::point::Point;
+use super::sensitivity::{Columns, Derivatives};
 use super::table::{Group, Table};
 use crate::Matrix;
 use crate::effects::{InnerLoop, Law, Place, Sees};

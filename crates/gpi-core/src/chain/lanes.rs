@@ -1,6 +1,5 @@
 //! Arithmetic on the changes of several unknowns side by side.
 
-use crate::effects::Law;
 use pulp::Simd;
 
 /// Unknowns that run side by side: what the widest vectors of today's processors hold.
@@ -63,35 +62,6 @@ impl Weights {
     }
 }
 
-/// How a change of z and of the logarithms of half-widths shows in w.
-#[inline(always)]
-pub(super) fn pass<S: Simd>(
-    simd: S,
-    law: &Law,
-    z: Lanes,
-    widths: &[Lanes],
-    marks: &[f64],
-    places: &mut [Lanes],
-) -> Lanes {
-    let mut w = NONE;
-    match law {
-        Law::Power { .. } => add(simd, &mut w, marks[0], &z),
-        Law::Stops { weights, .. } => {
-            let stops = weights.iter().zip(widths).zip(marks).zip(places);
-            for (((weight, width), &mark), place) in stops {
-                // a play that slides up stands at z - r, one that slides down at z + r
-                if mark != 0.0 {
-                    *place = z;
-                    add(simd, place, -mark, width);
-                }
-                add(simd, &mut w, *weight, &z);
-                add(simd, &mut w, -weight, place);
-            }
-        }
-    }
-    w
-}
-
 /// Adds a multiple.
 #[inline(always)]
 pub(super) fn add<S: Simd>(simd: S, sum: &mut Lanes, factor: f64, values: &Lanes) {
@@ -99,25 +69,5 @@ pub(super) fn add<S: Simd>(simd: S, sum: &mut Lanes, factor: f64, values: &Lanes
     let (sums, values) = (S::as_mut_simd_f64s(sum).0, S::as_simd_f64s(values).0);
     for (sum, value) in sums.iter_mut().zip(values) {
         *sum = simd.mul_add_e_f64s(factor, *value, *sum);
-    }
-}
-
-/// One sample of a section in observer form, driven.
-#[inline(always)]
-pub(super) fn relax<S: Simd>(simd: S, a: &[f64], x: &mut [Lanes], driven: &[Lanes]) {
-    match (a, x) {
-        ([a1, a2], [x1, x2]) => {
-            let before = *x1;
-            *x1 = driven[0];
-            add(simd, x1, 1.0, x2);
-            add(simd, x1, -a1, &before);
-            *x2 = driven[1];
-            add(simd, x2, -a2, &before);
-        }
-        (a, x) => {
-            let before = x[0];
-            x[0] = driven[0];
-            add(simd, &mut x[0], -a[0], &before);
-        }
     }
 }

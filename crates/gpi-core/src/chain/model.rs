@@ -1,12 +1,12 @@
 //! A model's chain with its effects, a block of samples at a time.
 
-use crate::effects::{
-    ClosedLoops, Effect, InnerLoop, Moment, ParallelSections, Place, PlayCurves, Quantity, Stage,
-    Units,
-};
+use super::loops::Loops;
+use super::plays::Plays;
+use super::stages::Stages;
+use crate::effects::{ClosedLoops, Coefficients, Effect, ParallelSections, Place, Quantity, Units};
 use crate::linear::advance;
 use crate::model::{Model, ModelState};
-use crate::operators::{GpiState, Operator, play};
+use crate::operators::{GpiState, Operator};
 use crate::{Channel, Error, Matrix};
 use nalgebra::DVector;
 
@@ -81,10 +81,6 @@ impl Model {
         Ok(())
     }
 
-    fn moment<'a>(&self, sample: usize, covariates: &'a [f64]) -> Moment<'a> {
-        Moment { time: sample as f64 / self.rate(), rate: self.rate(), covariates }
-    }
-
     /// What the effects remember of an input and a v that have stood.
     pub(crate) fn rest_effects(&self, state: &mut ModelState, input: &[f64], v: &DVector<f64>) {
         let rest = |effect: &Effect| match effect.place() {
@@ -97,43 +93,31 @@ impl Model {
         state.effects = self.effects.iter().map(rest).collect();
     }
 
-    /// The effects that `choose` selects, with their states.
-    fn at<'a, T>(
-        &'a self,
-        states: &'a mut [Vec<f64>],
-        choose: impl Fn(Place<'a>) -> Option<T>,
-    ) -> impl Iterator<Item = (T, &'a mut Vec<f64>)> {
-        let pairs = self.effects.iter().zip(states);
-        pairs.filter_map(move |(effect, state)| Some((choose(effect.place())?, state)))
+    /// The stages before the hysteresis and after the dynamics, from a sample on.
+    fn stages(&self, first: usize) -> Stages<'_> {
+        Stages { effects: &self.effects, rate: self.rate(), first }
     }
 
     /// The drive that reaches the hysteresis.
     pub(crate) fn drive_from(&self, state: &mut ModelState, input: &Matrix) -> Matrix {
         let mut drive = input.clone();
-        for (effect, memory) in self.at(&mut state.effects, Place::input_stage) {
-            for value in drive.column_mut(effect.input()).iter_mut() {
-                *value = effect.drive(memory, *value, self.rate());
-            }
-        }
+        self.stages(state.sample).drive(&mut state.effects, &mut drive);
         drive
     }
 
-    /// The curves through which the plays of an input are read.
-    fn play_curves(&self, input: usize) -> Vec<&dyn PlayCurves> {
-        let curves = self.effects.iter().filter_map(|effect| effect.place().play_curves());
-        curves.filter(|own| own.input() == input).collect()
+    /// The plays of an input at the places of a state, with the effects on them.
+    fn plays<'a>(&'a self, input: usize, state: &GpiState<f64, Vec<f64>>) -> Plays<'a> {
+        let bank = self.hysteresis()[input].plays();
+        let bank = (bank.half_widths(), bank.weights());
+        let mut plays = Plays::new(bank, &self.effects, input, self.rate());
+        plays.places.copy_from_slice(state.plays.plays());
+        plays
     }
 
-    /// What plays that stand are read as; `v` without effects.
+    /// v of plays in steady state, which is `v` without effects.
     pub(crate) fn read_plays(&self, input: usize, state: &GpiState<f64, Vec<f64>>, v: f64) -> f64 {
-        let curves = self.play_curves(input);
-        if curves.is_empty() {
-            return v;
-        }
-        let bank = self.hysteresis()[input].plays();
-        let plays = bank.half_widths().iter().zip(bank.weights()).zip(state.plays.plays());
-        let read = |r, place| curves.iter().fold(place, |place, own| own.read(r, place).0);
-        plays.map(|((&r, weight), &place)| weight * read(r, place)).sum()
+        let plays = self.plays(input, state);
+        if plays.are_curved() { plays.held() } else { v }
     }
 
     /// v of one input, with the effects on its plays.
@@ -145,33 +129,19 @@ impl Model {
         signal: &mut [f64],
     ) -> Result<(), Error> {
         let hysteresis = &self.hysteresis()[input];
-        let curves = self.play_curves(input);
-        let widths = self.at(memories, Place::play_widths).filter(|(own, _)| own.input() == input);
-        let mut widths: Vec<_> = widths.map(|(own, memory)| (own, memory, 0.0)).collect();
-        if widths.is_empty() && curves.is_empty() {
+        let mut plays = self.plays(input, state);
+        if plays.are_plain() {
             hysteresis.in_place(state, signal);
             return Ok(());
         }
-        let (envelope, bank) = (hysteresis.envelope(), hysteresis.plays());
-        let mut places = state.plays.plays().to_vec();
+        plays.exchange(memories);
         for value in signal {
-            let speed = (*value - state.envelope.previous).abs() * self.rate();
-            for (own, memory, speed_seen) in &mut widths {
-                *speed_seen = own.speed_seen(memory, speed, self.rate());
-            }
-            let z = envelope.step(&mut state.envelope, *value);
-            *value = 0.0;
-            let plays = bank.half_widths().iter().zip(bank.weights()).zip(&mut places);
-            for ((&r, weight), place) in plays {
-                let width = widths
-                    .iter()
-                    .fold(r, |width, (own, _, speed_seen)| own.width(width, *speed_seen).0);
-                *place = play(width, z, *place);
-                let read = curves.iter().fold(*place, |place, own| own.read(r, place).0);
-                *value += weight * read;
-            }
+            plays.drive_changes(*value - state.envelope.previous);
+            let z = hysteresis.envelope().step(&mut state.envelope, *value);
+            *value = plays.step(z, |_, _| {});
         }
-        state.plays = bank.state_from(places)?;
+        plays.exchange(memories);
+        state.plays = hysteresis.plays().state_from(plays.places)?;
         Ok(())
     }
 
@@ -185,10 +155,12 @@ impl Model {
             Matrix::zeros(v.nrows(), linear.outputs())
         };
         let rate = self.rate();
-        for (own, memory) in self.at(&mut state.effects, Place::parallel_sections) {
+        let stages = self.stages(0);
+        for (own, memory) in stages.at(&mut state.effects, Place::parallel_sections) {
+            let sections = own.sections(rate);
             let mut column = output.column_mut(0);
             for (value, &v) in column.iter_mut().zip(v.column(own.input()).iter()) {
-                *value += beside(own, memory, v, rate);
+                *value += in_parallel(own.dead_time(), &sections, memory, v);
             }
         }
         if has_loops {
@@ -200,16 +172,11 @@ impl Model {
     /// Adds what G makes of v with its loops closed.
     fn circulate(&self, state: &mut ModelState, v: &Matrix, output: &mut Matrix) {
         let linear = self.linear();
-        let mut loops: Vec<(&InnerLoop, &mut [f64])> = Vec::new();
-        for (own, memory) in self.at(&mut state.effects, Place::closed_loops) {
-            memory.resize(own.loops().iter().map(|inner| inner.law.stops()).sum(), 0.0);
-            let mut rest = &mut memory[..];
-            for inner in own.loops() {
-                let (places, others) = rest.split_at_mut(inner.law.stops());
-                loops.push((inner, places));
-                rest = others;
-            }
-        }
+        let stages = self.stages(0);
+        let mut closed: Vec<_> = stages.at(&mut state.effects, Place::closed_loops).collect();
+        let mut loops = Loops::new(closed.iter().flat_map(|(own, _)| own.loops()));
+        let places = closed.iter().flat_map(|(_, memory)| memory.iter().copied());
+        loops.places().zip(places).for_each(|(place, known)| *place = known);
         let mut drive = vec![0.0; linear.order()];
         for k in 0..v.nrows() {
             let now = v.row(k).transpose();
@@ -217,61 +184,26 @@ impl Model {
             let own = linear.step(&mut state.linear, &now);
             let displacement = output.row(k).transpose() + own;
             output.set_row(k, &displacement.transpose());
+            loops.observe(before.as_slice(), now.as_slice(), displacement.as_slice());
             drive.fill(0.0);
-            for (inner, places) in &mut loops {
-                let z =
-                    inner.sees.signal(before.as_slice(), now.as_slice(), displacement.as_slice());
-                let w = inner.law.step(places, z, &mut vec![0.0; inner.law.marks()]);
-                let first = linear.order() - inner.drives.len();
-                let driven = drive[first..].iter_mut().zip(&inner.drives);
-                driven.for_each(|(sum, drive)| *sum += drive * w);
-            }
+            loops.drive(&mut drive);
             state.linear.iter_mut().zip(&drive).for_each(|(x, drive)| *x += drive);
+        }
+        let mut places = loops.places();
+        for (own, memory) in &mut closed {
+            let stops = own.loops().iter().map(|inner| inner.law.stops()).sum();
+            **memory = places.by_ref().take(stops).map(|place| *place).collect();
         }
     }
 
-    /// The output stage, and what is added before and behind it.
+    /// The output stage, and what is added before and after it.
     pub(crate) fn read_from(
         &self,
         state: &mut ModelState,
         output: &mut Matrix,
         covariates: &Matrix,
     ) {
-        let first = state.sample;
-        self.add_from(Stage::Displaced, state, output, covariates);
-        for (effect, memory) in self.at(&mut state.effects, Place::output_stage) {
-            let mut column = output.column_mut(effect.output());
-            if memory.is_empty() {
-                *memory = effect.rest(column[0]);
-            }
-            for (k, value) in column.iter_mut().enumerate() {
-                *value = effect.sense(memory, *value, self.moment(first + k, &[])).0;
-            }
-        }
-        self.add_from(Stage::Added, state, output, covariates);
-    }
-
-    fn add_from(
-        &self,
-        stage: Stage,
-        state: &mut ModelState,
-        output: &mut Matrix,
-        covariates: &Matrix,
-    ) {
-        let first = state.sample;
-        let rows = covariates.transpose();
-        let width = rows.nrows();
-        let at = |k: usize| &rows.as_slice()[k * width..(k + 1) * width];
-        let moves_stage = stage == Stage::Displaced;
-        let added = self.at(&mut state.effects, Place::added);
-        for (effect, memory) in added.filter(|(effect, _)| effect.moves_stage() == moves_stage) {
-            if memory.is_empty() {
-                *memory = effect.rest(self.moment(0, at(0)));
-            }
-            for (k, value) in output.column_mut(effect.output()).iter_mut().enumerate() {
-                *value += effect.add(memory, self.moment(first + k, at(k)));
-            }
-        }
+        self.stages(state.sample).read(&mut state.effects, covariates, output);
     }
 }
 
@@ -291,9 +223,9 @@ fn standing(own: &dyn ParallelSections, v: &DVector<f64>, rate: f64) -> Vec<f64>
     states
 }
 
-/// One sample of a block's sections in observer form.
-fn beside(effect: &dyn ParallelSections, memory: &mut [f64], v: f64, rate: f64) -> f64 {
-    let (line, states) = memory.split_at_mut(effect.dead_time());
+/// One sample of sections in parallel with G, behind a dead time; `memory` holds the delay line, then the states.
+fn in_parallel(dead_time: usize, sections: &[Coefficients], memory: &mut [f64], v: f64) -> f64 {
+    let (line, states) = memory.split_at_mut(dead_time);
     let mut delayed = v;
     if let Some(last) = line.last().copied() {
         line.rotate_right(1);
@@ -301,10 +233,10 @@ fn beside(effect: &dyn ParallelSections, memory: &mut [f64], v: f64, rate: f64) 
         delayed = last;
     }
     let (mut sum, mut first) = (0.0, 0);
-    for (a, b) in effect.sections(rate) {
+    for (a, b) in sections {
         let own = &mut states[first..first + a.len()];
         sum += own[0];
-        advance(&a, own, |state| b[state] * delayed);
+        advance(a, own, |state| b[state] * delayed);
         first += a.len();
     }
     sum

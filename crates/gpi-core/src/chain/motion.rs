@@ -1,71 +1,62 @@
-//! G with its loops and the sections in parallel, sample by sample.
+//! The linear dynamics in motion: G with its loops, and the sections in parallel with G.
+//!
+//! ```text
+//! y = C x + D v,      x+ = A x + B v + E w
+//! ```
+//!
+//! A is block diagonal, one block a section in observer form: `x1+ = -a1 x1 + x2 + d1`, `x2+ = -a2 x1 + d2` for what
+//! drives it, d. Values, tangents and adjoints of a section's step stand here side by side.
 
-use crate::chain::point::Point;
-use crate::effects::InnerLoop;
+use super::lanes::{Lanes, add};
+use super::loops::Loops;
+use super::point::Point;
 use crate::linear::{Section, advance};
+use pulp::Simd;
 
-/// The linear dynamics of a point in motion.
+/// The linear dynamics of a point.
 pub(crate) struct Motion<'a> {
     sections: Vec<Section>,
     /// Columns of B by inputs, of C by states, rows of D by outputs, one after the other.
     b: Vec<Vec<f64>>,
     c: Vec<f64>,
     d: Vec<f64>,
-    loops: Vec<&'a InnerLoop>,
+    /// The states of G, which come first.
+    own: usize,
+    pub loops: Loops<'a>,
     /// Of all sections, one after the other.
     pub state: Vec<f64>,
     /// y, before the output stage.
     pub displacement: Vec<f64>,
-    /// Of each loop: z, w, how changes pass its law, and where its plays stand.
-    pub circulating: Vec<Circulating>,
     /// What drives each state.
     drive: Vec<f64>,
-}
-
-/// What goes around one loop.
-pub(crate) struct Circulating {
-    pub z: f64,
-    pub w: f64,
-    pub marks: Vec<f64>,
-    pub places: Vec<f64>,
 }
 
 impl<'a> Motion<'a> {
     /// At rest at zero.
     pub(crate) fn new(point: &'a Point) -> Self {
-        let loops: Vec<&InnerLoop> = point.loops().collect();
-        let rest = |inner: &&InnerLoop| Circulating {
-            z: 0.0,
-            w: 0.0,
-            marks: vec![0.0; inner.law.marks()],
-            places: vec![0.0; inner.law.stops()],
-        };
         let sections = point.sections();
-        let column = |input: usize| {
-            let own = sections.iter().map(|section| section.b.column(input).into_owned());
-            own.flat_map(|column| column.data.as_vec().clone()).collect()
-        };
+        let (outputs, inputs) = point.dynamics.d.shape();
         Self {
-            b: (0..point.dynamics.inputs()).map(column).collect(),
+            b: columns(&sections, inputs),
             c: sections.iter().flat_map(|section| section.c.as_slice()).copied().collect(),
             d: point.dynamics.d.transpose().as_slice().to_vec(),
-            drive: vec![0.0; point.order()],
-            circulating: loops.iter().map(rest).collect(),
-            loops,
+            own: point.dynamics.order(),
+            loops: Loops::new(point.loops()),
             state: vec![0.0; point.order()],
-            displacement: vec![0.0; point.dynamics.outputs()],
+            displacement: vec![0.0; outputs],
+            drive: vec![0.0; point.order()],
             sections,
         }
     }
 
-    /// Before the record v stood, and nothing went around the loops.
+    /// Puts the state where a constant v leads to; nothing goes around the loops.
     pub(crate) fn stand(&mut self, v: &[f64]) {
         let v = nalgebra::DVector::from_column_slice(v);
-        let standing = self.sections.iter().map(|section| section.standing(&section.b) * &v);
-        self.state = standing.flat_map(|states| states.data.as_vec().clone()).collect();
+        let steady = self.sections.iter().map(|section| section.standing(&section.b) * &v);
+        self.state = steady.flat_map(|states| states.data.as_vec().clone()).collect();
     }
 
-    /// Works out the displacement and what goes around the loops, at this sample's v.
+    /// The displacement and the signals of the loops at this sample's v.
     pub(crate) fn observe(&mut self, v: &[f64]) {
         for (y, d) in self.displacement.iter_mut().zip(self.d.chunks_exact(v.len())) {
             *y = d.iter().zip(v).map(|(d, v)| d * v).sum();
@@ -73,23 +64,16 @@ impl<'a> Motion<'a> {
         for (x, c) in self.state.iter().zip(self.c.chunks_exact(self.displacement.len())) {
             self.displacement.iter_mut().zip(c).for_each(|(y, c)| *y += c * x);
         }
-        for (inner, around) in self.loops.iter().zip(&mut self.circulating) {
-            let own = &self.state[..inner.drives.len()];
-            around.z = inner.sees.signal(own, v, &self.displacement);
-            around.w = inner.law.step(&mut around.places, around.z, &mut around.marks);
-        }
+        self.loops.observe(&self.state[..self.own], v, &self.displacement);
     }
 
-    /// Moves the state on by what was observed.
+    /// Takes the state to the next sample.
     pub(crate) fn advance(&mut self, v: &[f64]) {
         self.drive.fill(0.0);
-        let inputs = self.b.iter().map(Vec::as_slice).zip(v.iter().copied());
-        let around = self.circulating.iter().map(|around| around.w);
-        let loops = self.loops.iter().map(|inner| inner.drives.as_slice()).zip(around);
-        for (drives, value) in inputs.chain(loops) {
-            let driven = self.drive.iter_mut().zip(drives);
-            driven.for_each(|(sum, drive)| *sum += drive * value);
+        for (b, v) in self.b.iter().zip(v) {
+            self.drive.iter_mut().zip(b).for_each(|(sum, b)| *sum += b * v);
         }
+        self.loops.drive(&mut self.drive[..self.own]);
         let mut first = 0;
         for section in &self.sections {
             let own = first..first + section.order();
@@ -97,5 +81,51 @@ impl<'a> Motion<'a> {
             advance(&section.a, &mut self.state[own.clone()], |j| drive[j]);
             first = own.end;
         }
+    }
+}
+
+/// Columns of B by inputs, over the states of all sections.
+pub(super) fn columns(sections: &[Section], inputs: usize) -> Vec<Vec<f64>> {
+    let column = |input: usize| {
+        let own = sections.iter().map(|section| section.b.column(input).into_owned());
+        own.flat_map(|column| column.data.as_vec().clone()).collect()
+    };
+    (0..inputs).map(column).collect()
+}
+
+/// Rows of C by outputs, over the states of all sections.
+pub(super) fn rows(sections: &[Section], outputs: usize) -> Vec<Vec<f64>> {
+    let row = |output: usize| {
+        let own = sections.iter().map(|section| section.c.row(output).transpose());
+        own.flat_map(|row| row.data.as_vec().clone()).collect()
+    };
+    (0..outputs).map(row).collect()
+}
+
+/// The tangent of a section's step, with the changes of what drives it.
+#[inline(always)]
+pub(super) fn advance_tangent<S: Simd>(simd: S, a: &[f64], x: &mut [Lanes], driven: &[Lanes]) {
+    match (a, x) {
+        ([a1, a2], [x1, x2]) => {
+            let before = *x1;
+            *x1 = driven[0];
+            add(simd, x1, 1.0, x2);
+            add(simd, x1, -a1, &before);
+            *x2 = driven[1];
+            add(simd, x2, -a2, &before);
+        }
+        (a, x) => {
+            let before = x[0];
+            x[0] = driven[0];
+            add(simd, &mut x[0], -a[0], &before);
+        }
+    }
+}
+
+/// The adjoint of a section's step: from the cost's sensitivity to the next state to that to this one.
+pub(super) fn advance_adjoint(a: &[f64], x: &mut [f64]) {
+    match (a, x) {
+        ([a1, a2], [x1, x2]) => (*x1, *x2) = (-a1 * *x1 - a2 * *x2, *x1),
+        (a, x) => x[0] *= -a[0],
     }
 }

@@ -1,7 +1,8 @@
 //! Everything that is estimated, as one point.
 
 use crate::Matrix;
-use crate::chain::hysteresis::{Derivatives, Parameters};
+use crate::chain::hysteresis::Parameters;
+use crate::chain::sensitivity::Derivatives;
 use crate::effects::{Coefficients, Effect, OutputStage, PlaceMut};
 use crate::linear::{Section, Sections};
 use nalgebra::DVector;
@@ -128,6 +129,14 @@ impl Point {
         let first = self.dynamics.sections.len() + first;
         let count = orders(&self.effects[place], self.rate).len();
         point.dynamics.sections.extend(self.sections().drain(first..first + count));
+        let more = point.dynamics.order() - own;
+        let loops = point.effects.iter_mut().filter_map(|effect| match effect.place_mut() {
+            PlaceMut::Loops(closed) => Some(closed.loops_mut()),
+            _ => None,
+        });
+        for inner in loops.flatten() {
+            inner.add_states(more);
+        }
         point
     }
 

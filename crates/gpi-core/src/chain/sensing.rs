@@ -1,6 +1,7 @@
-//! The output stage of one output.
+//! The output stage of one output, sample by sample: values, tangents and adjoints.
 
-use crate::chain::point::Point;
+use super::lanes::Lanes;
+use super::point::Point;
 use crate::effects::{Moment, OutputStage, Slope};
 
 /// The effects of the output stage on one output, with what they remember.
@@ -14,7 +15,7 @@ impl<'a> Sensing<'a> {
         let own = point.output_stages().filter(|effect| effect.output() == output);
         let mut value = first;
         let blocks = own.map(|effect| {
-            let moment = point.moment(0, &[]);
+            let moment = point.stages().moment(0, &[]);
             let state = effect.rest(value);
             value = effect.sense(&mut state.clone(), value, moment).0;
             (effect, state)
@@ -29,5 +30,28 @@ impl<'a> Sensing<'a> {
             slopes.push(slope);
             sensed
         })
+    }
+}
+
+impl Slope {
+    /// The tangent of a sample: changes of the displacement become those of the reading; `held` are the changes that the
+    /// reading had.
+    #[inline(always)]
+    pub(super) fn tangent(&self, change: &mut Lanes, held: &mut Lanes) {
+        match self {
+            Self::Times(factor) => change.iter_mut().for_each(|value| *value *= factor),
+            Self::Held => *change = *held,
+        }
+        *held = *change;
+    }
+
+    /// The adjoint of a sample: the cost's sensitivity to the reading becomes that to the displacement, and to the
+    /// reading before.
+    pub(super) fn adjoint(&self, change: &mut f64, held: &mut f64) {
+        let all = *change + *held;
+        (*change, *held) = match self {
+            Self::Times(factor) => (factor * all, 0.0),
+            Self::Held => (0.0, all),
+        };
     }
 }

@@ -1,14 +1,13 @@
 //! One experiment streamed through the hysteresis of every input, through G and the output stage, and
 //! through all of their derivatives.
 
-use super::hysteresis::{Derivatives, Sensitivity};
 use super::injections::{ONE, Signals};
 use super::motion::Motion;
 use super::point::{Past, Point};
 use super::sensing::Sensing;
+use super::sensitivity::{Derivatives, Sensitivity};
 use super::table::{Group, Table};
 use super::tangents::{Tangents, Trace};
-use crate::effects::Stage;
 use crate::{Error, Experiment, Matrix};
 use std::ops::Range;
 
@@ -64,13 +63,14 @@ impl<'a> Stream<'a> {
         let channels = point.channels.iter().enumerate();
         let sensitivities = channels.map(|(input, channel)| {
             let start = plays.as_ref().map(|plays| &plays[input][..]);
-            Sensitivity::new(channel, start, wanted, point.beside(input))
+            Sensitivity::new(channel, start, wanted, point.plays(input))
         });
         let signals = Signals::new(point, wanted);
         let drive = point.drive(experiment);
-        let added = |stage| {
+        let stages = point.stages();
+        let added = |moves_stage| {
             let mut added = Matrix::zeros(experiment.input.nrows(), point.dynamics.outputs());
-            point.add(stage, experiment, &mut added);
+            stages.add(&mut stages.memories(), moves_stage, &experiment.covariates, &mut added);
             added
         };
         Ok(Self {
@@ -82,8 +82,8 @@ impl<'a> Stream<'a> {
             tangents: Tangents::new(point, table, signals, experiment, index),
             drive,
             effects: point.effect_columns(experiment, index)?,
-            displaced: added(Stage::Displaced),
-            added: added(Stage::Added),
+            displaced: added(true),
+            added: added(false),
             offset_unknowns: table.range(Group::Offsets { experiment: index }).start,
             effect_unknowns: (0..point.effects.len())
                 .map(|place| table.range(Group::Effect { place }))
@@ -198,7 +198,7 @@ impl<'a> Stream<'a> {
             }
             self.motion.observe(&v);
             signals[states.clone()].copy_from_slice(&self.motion.state);
-            for (own, around) in loops.iter().zip(&self.motion.circulating) {
+            for (own, around) in loops.iter().zip(&self.motion.loops.signals) {
                 signals[own.start] = around.w;
                 let stops = &mut signals[own.start + 1..own.end];
                 stops.iter_mut().zip(&around.places).for_each(|(s, place)| *s = around.z - place);
@@ -214,7 +214,7 @@ impl<'a> Stream<'a> {
                     .collect();
             }
             let own = scored.next_if(|(_, scored)| **scored == place);
-            let moment = self.point.moment(k, &[]);
+            let moment = self.point.stages().moment(k, &[]);
             for (output, &displaced) in displaced.iter().enumerate() {
                 let sensed = self.sensing[output].step(displaced, moment, &mut trace.slopes);
                 if let Some((column, _)) = own {

@@ -1,7 +1,8 @@
 //! Derivatives by all unknowns, taken through G, its loops and the output stage side by side.
 
 use super::injections::{Injection, Places, Signals, injections};
-use super::lanes::{LANES, Lanes, NONE, Weights, add, pass, relax};
+use super::lanes::{LANES, Lanes, NONE, Weights, add};
+use super::motion::{advance_tangent, columns, rows};
 use super::point::Point;
 use super::table::{Group, Table};
 use crate::effects::{InnerLoop, OutputStage, Sees, Slope};
@@ -115,19 +116,20 @@ impl<'a> Tangents<'a> {
             }
         };
         let tiles: Vec<Tile> = (0..table.len).step_by(LANES).map(tile).collect();
-        let (c, b) = by_states(&all_sections, dynamics.outputs(), dynamics.inputs());
+        let (c, b) =
+            (rows(&all_sections, dynamics.outputs()), columns(&all_sections, dynamics.inputs()));
         let none = vec![0.0; point.order()];
         let sees = |inner: &&'a InnerLoop| match &inner.sees {
             Sees::Output(_) => &none[..],
             Sees::Mixture { states, .. } => states,
         };
-        let rows =
+        let weights =
             |rows: &[Vec<f64>]| Weights::new(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>());
         let seen = c.iter().map(Vec::as_slice).chain(loops.iter().map(sees));
         let drives: Vec<&[f64]> = loops.iter().map(|inner| &inner.drives[..]).collect();
         Self {
             seen: Weights::new(&seen.collect::<Vec<_>>()),
-            driven: rows(&b),
+            driven: weights(&b),
             circulating: Weights::new(&drives),
             d: &dynamics.d,
             loops,
@@ -219,7 +221,7 @@ impl<'a> Tangents<'a> {
                 let (own, others) = marks.split_at(inner.law.marks());
                 let (places, rest) = plays.split_at_mut(inner.law.stops());
                 let widths = &work[half_widths[number].clone()];
-                let around = pass(simd, &inner.law, sum, widths, own, places);
+                let around = inner.law.tangent(simd, sum, widths, own, places);
                 add(simd, &mut work[w.start + number], 1.0, &around);
                 (marks, plays) = (others, rest);
             }
@@ -228,11 +230,7 @@ impl<'a> Tangents<'a> {
                 let slopes = &trace.slopes[k * self.sensed.len()..(k + 1) * self.sensed.len()];
                 for ((&output, slope), held) in self.sensed.iter().zip(slopes).zip(&mut tile.held) {
                     let row = &mut work[y.start + output];
-                    match slope {
-                        Slope::Times(factor) => row.iter_mut().for_each(|value| *value *= factor),
-                        Slope::Held => *row = *held,
-                    }
-                    *held = *row;
+                    slope.tangent(row, held);
                 }
             }
             if scores {
@@ -249,7 +247,7 @@ impl<'a> Tangents<'a> {
             for section in &self.sections[tile.sections.clone()] {
                 let order = section.order();
                 let next = &work[states.start + first..states.start + first + order];
-                relax(simd, &section.a, &mut tile.x[first..first + order], next);
+                advance_tangent(simd, &section.a, &mut tile.x[first..first + order], next);
                 first += order;
             }
         }
@@ -325,22 +323,4 @@ fn moving(sections: &[Section], moved: &[usize], all: bool) -> (Range<usize>, Ra
         first = own.end;
     }
     found.unwrap_or((0..0, 0..0))
-}
-
-/// Rows of C by outputs and columns of B by inputs, by the states of all sections.
-pub(super) fn by_states(
-    sections: &[Section],
-    outputs: usize,
-    inputs: usize,
-) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
-    let row = |output: usize| {
-        let own = sections.iter().flat_map(|s| s.c.row(output).iter().copied().collect::<Vec<_>>());
-        own.collect()
-    };
-    let column = |input: usize| {
-        let own =
-            sections.iter().flat_map(|s| s.b.column(input).iter().copied().collect::<Vec<_>>());
-        own.collect()
-    };
-    ((0..outputs).map(row).collect(), (0..inputs).map(column).collect())
 }

@@ -1,8 +1,5 @@
 //! A loop that is closed around the linear dynamics.
 
-use crate::linear::dot;
-use crate::operators::play;
-
 /// `w = law(z)`, and `w(k)` drives the states of G for sample k + 1: `x+ = A x + B v + E w`.
 ///
 /// No loop is algebraic, because w acts one sample later. With [`Law::Stops`] w is bounded, so that a stable
@@ -61,50 +58,21 @@ impl Law {
         }
     }
 
-    /// w. `places` are the outputs of the plays. `marks` receive how changes of z pass: the slope of a power,
-    /// or for each stop the direction in which its play slides, 0 where it sticks.
-    pub(crate) fn step(&self, places: &mut [f64], z: f64, marks: &mut [f64]) -> f64 {
-        match self {
-            Self::Power { exponent, scale } => {
-                let relative = z / scale;
-                marks[0] = f64::from(*exponent) * relative.powi(exponent - 1);
-                relative.powi(*exponent) * scale
-            }
-            Self::Stops { half_widths, weights } => {
-                let mut w = 0.0;
-                let stops = half_widths.iter().zip(weights).zip(places).zip(marks);
-                for (((&r, weight), place), mark) in stops {
-                    let before = std::mem::replace(place, play(r, z, *place));
-                    *mark = if *place == before { 0.0 } else { (*place - before).signum() };
-                    w += weight * (z - *place);
-                }
-                w
-            }
-        }
-    }
-
-    /// The number of marks of [`Law::step`].
+    /// The number of marks that a step leaves for derivatives.
     pub(crate) fn marks(&self) -> usize {
         self.stops().max(1)
     }
 }
 
-impl Sees {
-    /// z for a state of G with its dead time, v, and the displacement of all outputs.
-    pub(crate) fn signal(&self, state: &[f64], v: &[f64], displacement: &[f64]) -> f64 {
-        match self {
-            Self::Output(output) => displacement[*output],
-            Self::Mixture { states, inputs } => {
-                let (late, own) = state.split_at(state.len() - states.len());
-                // the oldest inputs leave the dead time
-                let v = if late.is_empty() { v } else { &late[late.len() - inputs.len()..] };
-                dot(states, own) + dot(inputs, v)
-            }
+impl InnerLoop {
+    /// Takes states of G into account that it neither drives nor sees, behind its own.
+    pub(crate) fn add_states(&mut self, count: usize) {
+        self.drives.resize(self.drives.len() + count, 0.0);
+        if let Sees::Mixture { states, .. } = &mut self.sees {
+            states.resize(states.len() + count, 0.0);
         }
     }
-}
 
-impl InnerLoop {
     /// Why it is invalid around a G of so many states, inputs and outputs; `None` where it is valid.
     pub(crate) fn flaw(&self, states: usize, inputs: usize, outputs: usize) -> Option<String> {
         let drives = self.drives.len();

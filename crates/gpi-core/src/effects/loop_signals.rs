@@ -113,9 +113,10 @@ fn stacked(signals: &[Matrix]) -> Matrix {
 mod tests {
     use super::*;
     use crate::Model;
-    use crate::chain::hysteresis::{Derivatives, Parameters};
+    use crate::chain::hysteresis::Parameters;
     use crate::chain::looped::{model, record, run};
     use crate::chain::point::{DynamicsFreedom, Freedom};
+    use crate::chain::sensitivity::Derivatives;
     use crate::explain::base::Base;
     use crate::fit::preparation::Prepared;
     use crate::optimize::Loss;

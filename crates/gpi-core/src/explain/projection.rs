@@ -129,9 +129,10 @@ impl Base<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::hysteresis::{Derivatives, Parameters};
+    use crate::chain::hysteresis::Parameters;
     use crate::chain::looped::{model, record, run};
     use crate::chain::point::{DynamicsFreedom, Freedom};
+    use crate::chain::sensitivity::Derivatives;
     use crate::effects::{InnerLoop, Law, Sees, Stiffness};
     use crate::fit::preparation::Prepared;
     use crate::optimize::Loss;

@@ -2,8 +2,9 @@
 
 use crate::Progress;
 use crate::chain::bounds::range;
-use crate::chain::hysteresis::{Derivatives, Parameters};
+use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{DynamicsFreedom, Freedom, Past, Point};
+use crate::chain::sensitivity::Derivatives;
 use crate::fit::Grid;
 use crate::fit::minimize::{FitOptions, fit};
 use crate::linear::Sections;

@@ -128,9 +128,10 @@ fn add(equations: &mut NormalEquations, rows: Rows, loss: &Loss) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::hysteresis::{Derivatives, Parameters};
+    use crate::chain::hysteresis::Parameters;
     use crate::chain::looped::{model, record, run};
     use crate::chain::point::DynamicsFreedom;
+    use crate::chain::sensitivity::Derivatives;
     use crate::fit::preparation::Prepared;
 
     #[test]

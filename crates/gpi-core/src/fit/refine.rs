@@ -1,7 +1,8 @@
 //! Joint refinement of all parts of a model.
 
-use crate::chain::hysteresis::{Derivatives, Parameters};
+use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{DynamicsFreedom, Freedom, Point};
+use crate::chain::sensitivity::Derivatives;
 use crate::chain::table::Table;
 use crate::fit::certainty;
 use crate::fit::minimize::{FitOptions, Fitted, fit};

@@ -141,9 +141,10 @@ impl Representatives {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::hysteresis::{Derivatives, Parameters};
+    use crate::chain::hysteresis::Parameters;
     use crate::chain::looped::{model, record, run};
     use crate::chain::point::{DynamicsFreedom, Freedom};
+    use crate::chain::sensitivity::Derivatives;
     use crate::fit::preparation::Prepared;
     use crate::fit::problem::Estimation;
     use crate::optimize::{LeastSquares, Loss};

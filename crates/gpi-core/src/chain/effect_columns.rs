@@ -1,0 +1,121 @@
+//! What effects contribute to the output: their derivatives from differences, and what a probe would add.
+//!
+//! The output is linear in most values of effects, so that a difference over [`Block::steps`](crate::effects::Block::steps)
+//! is exact up to rounding. Plays read through curves have derivatives of their own; loops and sections stream theirs.
+
+use super::free_run::Signals;
+use super::point::{Past, Point};
+use crate::effects::{Added, Effect, Place, PlayCurves, Stage};
+use crate::{Error, Experiment, Matrix};
+
+impl Point {
+    /// Adds one signal, so many times.
+    fn add_one(&self, added: &dyn Added, experiment: &Experiment, times: f64, output: &mut Matrix) {
+        let covariates = &experiment.covariates;
+        self.stages().add_one(added, &mut Vec::new(), covariates, times, output);
+    }
+
+    /// The signal that an effect adds to the reading as it is, whatever the rest of the model does.
+    fn apart<'a>(&self, effect: &'a Effect) -> Option<&'a dyn Added> {
+        effect.place().added().filter(|added| !added.moves_stage() || !self.senses())
+    }
+
+    /// What the output gains by a block beside this point's own; `here` is the output.
+    pub(crate) fn gained_by(
+        &self,
+        effect: &Effect,
+        known: &Signals,
+        here: &Matrix,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Matrix, Error> {
+        if let Some(added) = self.apart(effect) {
+            let mut gained = Matrix::zeros(here.nrows(), here.ncols());
+            self.add_one(added, experiment, 1.0, &mut gained);
+            return Ok(gained);
+        }
+        let point = self.with_effect(effect.clone());
+        Ok(point.output_from(effect.stage(), known, experiment, index)? - here)
+    }
+
+    /// Derivatives of the output by the values of every effect whose own do not stream along: `[effect][value]`,
+    /// (samples, outputs), from differences.
+    pub(crate) fn effect_columns(
+        &self,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Vec<Vec<Matrix>>, Error> {
+        let streams =
+            |effect: &Effect| matches!(effect.place(), Place::Curves(_) | Place::Loops(_));
+        if self.effects.iter().all(streams) {
+            return Ok(vec![Vec::new(); self.effects.len()]);
+        }
+        let known = self.signals(experiment, index)?;
+        let here = self.output_from(Stage::Added, &known, experiment, index)?;
+        let of = |(place, effect): (usize, &Effect)| {
+            if streams(effect) {
+                return Ok(Vec::new());
+            }
+            self.columns_of(place, &known, &here, experiment, index)
+        };
+        self.effects.iter().enumerate().map(of).collect()
+    }
+
+    /// The same of one effect; `here` is the output.
+    pub(crate) fn columns_of(
+        &self,
+        place: usize,
+        known: &Signals,
+        here: &Matrix,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Vec<Matrix>, Error> {
+        let effect = &self.effects[place];
+        let Some(block) = effect.block() else { return Ok(Vec::new()) };
+        if let Place::Parallel(_) = effect.place() {
+            return Ok(Vec::new());
+        }
+        let steps = block.steps();
+        if let Place::Curves(curves) = effect.place() {
+            let input = curves.input();
+            let slopes = self.reading_slopes_of(curves, &known.drive, &self.pasts[index]);
+            let column = |(step, slope): (f64, nalgebra::RowDVector<f64>)| {
+                let mut moved = known.clone();
+                moved.intermediate.column_mut(input).axpy(step, &slope.transpose(), 1.0);
+                let there = self.output_from(Stage::Dynamics, &moved, experiment, index)?;
+                Ok((there - here) / step)
+            };
+            let rows = slopes.row_iter().map(nalgebra::Matrix::into_owned);
+            return steps.into_iter().zip(rows).map(column).collect();
+        }
+        let column = |(number, step): (usize, f64)| {
+            let mut values = block.values();
+            values[number] += step;
+            let mut moved = self.clone();
+            moved.effects[place].set(&values);
+            let apart = self.apart(&moved.effects[place]).zip(self.apart(effect));
+            if let Some((changed, own)) = apart {
+                let mut column = Matrix::zeros(here.nrows(), here.ncols());
+                self.add_one(changed, experiment, 1.0 / step, &mut column);
+                self.add_one(own, experiment, -1.0 / step, &mut column);
+                return Ok(column);
+            }
+            let there = moved.output_from(effect.stage(), known, experiment, index)?;
+            Ok((there - here) / step)
+        };
+        steps.into_iter().enumerate().map(column).collect()
+    }
+
+    /// Derivatives of v by the values of all curves through which plays are read, (values, samples) each.
+    pub(crate) fn reading_slopes(&self, drive: &Matrix, past: &Past) -> Vec<Matrix> {
+        self.play_curves().map(|curves| self.reading_slopes_of(curves, drive, past)).collect()
+    }
+
+    /// The same of one effect.
+    fn reading_slopes_of(&self, curves: &dyn PlayCurves, drive: &Matrix, past: &Past) -> Matrix {
+        let input = curves.input();
+        let start = past.plays.as_ref().map(|plays| &plays[input][..]);
+        let drive: Vec<f64> = drive.column(input).iter().copied().collect();
+        self.channels[input].reading_slopes(start, self.plays(input), &drive, curves)
+    }
+}

@@ -1,0 +1,160 @@
+//! Loops around the linear dynamics: values, tangents and adjoints of their laws.
+//!
+//! ```text
+//! z = S x + T v  (or an output),      w = law(z),      x+ = A x + B v + E w
+//! ```
+//!
+//! A power has the slope `dw/dz = n (z/s)^(n-1)`. A stop `z - F_r(z)` passes a change of z while its play F sticks; while
+//! it slides up (down), F is z - r (z + r), so that the stop shows the change of r alone. [`Law::step`] leaves these
+//! facts as marks: the slope of a power, or for each stop the direction in which its play slides, 0 where it sticks.
+
+use super::lanes::{Lanes, NONE, add};
+use crate::effects::{InnerLoop, Law, Sees};
+use crate::linear::dot;
+use crate::operators::play;
+use pulp::Simd;
+
+/// Loops in motion.
+pub(crate) struct Loops<'a> {
+    pub loops: Vec<&'a InnerLoop>,
+    /// The signals of each.
+    pub signals: Vec<LoopSignals>,
+}
+
+/// The signals of one loop, its marks, and the places of its plays.
+pub(crate) struct LoopSignals {
+    pub z: f64,
+    pub w: f64,
+    pub marks: Vec<f64>,
+    pub places: Vec<f64>,
+}
+
+impl<'a> Loops<'a> {
+    /// Loops in which nothing moves.
+    pub(crate) fn new(loops: impl Iterator<Item = &'a InnerLoop>) -> Self {
+        let loops: Vec<&InnerLoop> = loops.collect();
+        let rest = |inner: &&InnerLoop| LoopSignals {
+            z: 0.0,
+            w: 0.0,
+            marks: vec![0.0; inner.law.marks()],
+            places: vec![0.0; inner.law.stops()],
+        };
+        Self { signals: loops.iter().map(rest).collect(), loops }
+    }
+
+    /// z and w of one sample, from the state of G (that of its dead time first), v and the displacements.
+    pub(crate) fn observe(&mut self, state: &[f64], v: &[f64], displacement: &[f64]) {
+        for (inner, own) in self.loops.iter().zip(&mut self.signals) {
+            own.z = inner.sees.signal(state, v, displacement);
+            own.w = inner.law.step(&mut own.places, own.z, &mut own.marks);
+        }
+    }
+
+    /// The places of all plays.
+    pub(crate) fn places(&mut self) -> impl Iterator<Item = &mut f64> {
+        self.signals.iter_mut().flat_map(|own| &mut own.places)
+    }
+
+    /// Adds E w to what drives the states of G.
+    pub(crate) fn drive(&self, driven: &mut [f64]) {
+        for (inner, own) in self.loops.iter().zip(&self.signals) {
+            let first = driven.len() - inner.drives.len();
+            let driven = driven[first..].iter_mut().zip(&inner.drives);
+            driven.for_each(|(sum, drive)| *sum += drive * own.w);
+        }
+    }
+}
+
+impl Sees {
+    /// z at a state of G and its dead time, v and the displacement of all outputs.
+    fn signal(&self, state: &[f64], v: &[f64], displacement: &[f64]) -> f64 {
+        match self {
+            Self::Output(output) => displacement[*output],
+            Self::Mixture { states, inputs } => {
+                let (late, own) = state.split_at(state.len() - states.len());
+                // what comes out of the dead time is what went in first
+                let v = if late.is_empty() { v } else { &late[late.len() - inputs.len()..] };
+                dot(states, own) + dot(inputs, v)
+            }
+        }
+    }
+}
+
+impl Law {
+    /// w at z.
+    pub(crate) fn step(&self, places: &mut [f64], z: f64, marks: &mut [f64]) -> f64 {
+        match self {
+            Self::Power { exponent, scale } => {
+                let relative = z / scale;
+                marks[0] = f64::from(*exponent) * relative.powi(exponent - 1);
+                relative.powi(*exponent) * scale
+            }
+            Self::Stops { half_widths, weights } => {
+                let mut w = 0.0;
+                let stops = half_widths.iter().zip(weights).zip(places).zip(marks);
+                for (((&r, weight), place), mark) in stops {
+                    let before = std::mem::replace(place, play(r, z, *place));
+                    *mark = if *place == before { 0.0 } else { (*place - before).signum() };
+                    w += weight * (z - *place);
+                }
+                w
+            }
+        }
+    }
+
+    /// Changes of w by changes of z and of the half-widths; `places` are the changes of the plays.
+    #[inline(always)]
+    pub(super) fn tangent<S: Simd>(
+        &self,
+        simd: S,
+        z: Lanes,
+        half_widths: &[Lanes],
+        marks: &[f64],
+        places: &mut [Lanes],
+    ) -> Lanes {
+        let mut w = NONE;
+        match self {
+            Self::Power { .. } => add(simd, &mut w, marks[0], &z),
+            Self::Stops { weights, .. } => {
+                let stops = weights.iter().zip(half_widths).zip(marks).zip(places);
+                for (((weight, half_width), &mark), place) in stops {
+                    if mark != 0.0 {
+                        *place = z;
+                        add(simd, place, -mark, half_width);
+                    }
+                    add(simd, &mut w, *weight, &z);
+                    add(simd, &mut w, -weight, place);
+                }
+            }
+        }
+        w
+    }
+
+    /// The cost's sensitivity to z from that to w: the transpose of [`Law::tangent`]. `places` are the sensitivities
+    /// to the plays, and those to the half-widths are written.
+    pub(super) fn adjoint(
+        &self,
+        w: f64,
+        half_widths: &mut [f64],
+        marks: &[f64],
+        places: &mut [f64],
+    ) -> f64 {
+        let mut z = 0.0;
+        match self {
+            Self::Power { .. } => z += marks[0] * w,
+            Self::Stops { weights, .. } => {
+                let stops = weights.iter().zip(half_widths).zip(marks).zip(places);
+                for (((weight, half_width), &mark), place) in stops {
+                    z += weight * w;
+                    *place -= weight * w;
+                    if mark != 0.0 {
+                        z += *place;
+                        *half_width = -mark * *place;
+                        *place = 0.0;
+                    }
+                }
+            }
+        }
+        z
+    }
+}
