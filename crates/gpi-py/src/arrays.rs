@@ -49,7 +49,7 @@ pub(crate) fn matrix(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Matrix> {
     })
 }
 
-/// A signal: (samples,) or (samples, channels), and whether it had one dimension.
+/// A signal of shape (samples,) or (samples, channels), and whether it had one dimension.
 pub(crate) fn signal(name: &str, value: &Bound<'_, PyAny>) -> PyResult<(Matrix, bool)> {
     with_array(name, value, |array| copied(name, &array))
 }
@@ -69,8 +69,9 @@ fn copied(name: &str, array: &ArrayViewD<'_, f64>) -> PyResult<(Matrix, bool)> {
     }
 }
 
-/// Runs `read` on a signal's channels one after the other, its (samples, channels), and whether it had one dimension;
-/// a signal of one dimension is not copied.
+/// Runs `read` on a signal in column-major order, its shape (samples, channels), and whether it had one dimension.
+///
+/// A signal of one dimension is not copied.
 pub(crate) fn with_columns<T>(
     name: &str,
     value: &Bound<'_, PyAny>,
@@ -85,7 +86,7 @@ pub(crate) fn with_columns<T>(
     })
 }
 
-/// One signal, or a list or tuple of arrays: one an experiment.
+/// One signal, or a list or tuple of arrays with one array for each experiment.
 pub(crate) fn experiments(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Matrix>> {
     let items: Vec<Bound<'_, PyAny>> = if let Ok(list) = value.cast::<PyList>() {
         list.iter().collect()
@@ -112,9 +113,9 @@ pub(crate) fn markov(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Matri
     })
 }
 
-/// A new array for a signal (samples, channels), its channels one after the other; (samples,) where it has one dimension.
+/// A new column-major array for a signal of shape (samples, channels), or (samples,) if it has one dimension.
 ///
-/// NumPy's own memory comes in larger pages than the allocator's, which takes a third of a long signal's time.
+/// It is NumPy that allocates it: NumPy requests larger memory pages, which saves a third of the time for a long signal.
 pub(crate) fn empty_signal<'py>(
     py: Python<'py>,
     (samples, channels): (usize, usize),

@@ -38,19 +38,19 @@ fn class_of(py: Python<'_>, kind: ErrorKind) -> PyResult<Bound<'_, PyType>> {
         ErrorKind::Parameter => (
             &PARAMETER,
             "ParameterError",
-            "The call is wrong: a parameter is out of its range.",
+            "A parameter of the call is out of its range.",
             py.get_type::<PyValueError>(),
         ),
         ErrorKind::Data => (
             &DATA,
             "DataError",
-            "The data cannot be used for what was asked; the message says where and why.",
+            "The data cannot be used for this computation. The message says where and why.",
             py.get_type::<PyValueError>(),
         ),
         ErrorKind::Numerical => (
             &NUMERICAL,
             "NumericalError",
-            "The data are usable, but the numbers they lead to are not.",
+            "A computation failed numerically, although the data are usable.",
             py.get_type::<PyArithmeticError>(),
         ),
     };

@@ -20,11 +20,11 @@ use pyo3::prelude::*;
 /// seed : int
 ///     Seed of the phases.
 /// odd : bool
-///     Excite odd lines only, so that even nonlinearities show on the even lines.
+///     Whether to excite odd lines only, so that even nonlinearities are visible at the even lines.
 /// detection : bool
-///     Leave out one in four odd lines at random, so that odd nonlinearities show there.
+///     Whether to omit one in four odd lines at random, so that odd nonlinearities are visible there.
 /// slew : float, optional
-///     Largest slope in units per second; where it clips, harmonics appear.
+///     Largest slope in units per second. Harmonics appear if it limits the signal.
 ///
 /// Returns
 /// -------
@@ -34,7 +34,7 @@ use pyo3::prelude::*;
 /// Raises
 /// ------
 /// ParameterError
-///     A parameter out of its range, a band without a line.
+///     A parameter is out of its range, or the band contains no line.
 ///
 /// Examples
 /// --------
@@ -74,7 +74,7 @@ fn multisine(
 /// rate : float
 ///     Sampling rate in Hz.
 /// clock : float
-///     The signal may switch this often a second, in Hz.
+///     Rate at which the signal may switch, in Hz.
 /// range : tuple of float
 ///     The two levels, in the drive's unit.
 /// seed : int
@@ -90,7 +90,7 @@ fn multisine(
 /// Raises
 /// ------
 /// ParameterError
-///     A parameter out of its range, a clock too slow to switch at all.
+///     A parameter is out of its range, or the clock is too slow for the signal to switch at all.
 ///
 /// Examples
 /// --------
@@ -113,7 +113,7 @@ fn prbs(
     Ok(from_vector(py, &excitation::prbs(&drive, clock, seed).map_err(to_python)?))
 }
 
-/// A triangle that starts in the middle of the range, reaches its ends, then decays to the middle.
+/// A triangle wave that starts at the middle of the range, reaches both ends, then decays to the middle.
 ///
 /// Parameters
 /// ----------
@@ -122,7 +122,7 @@ fn prbs(
 /// rate : float
 ///     Sampling rate in Hz.
 /// frequency : float
-///     Periods a second, in Hz.
+///     Frequency of the triangle, in Hz.
 /// range : tuple of float
 ///     Smallest and largest value, in the drive's unit.
 /// slew : float, optional
@@ -136,7 +136,7 @@ fn prbs(
 /// Raises
 /// ------
 /// ParameterError
-///     A parameter out of its range, less than one period.
+///     A parameter is out of its range, or the signal is shorter than one period.
 ///
 /// Examples
 /// --------
@@ -159,10 +159,10 @@ fn decaying_triangle(
     Ok(from_vector(py, &signal))
 }
 
-/// A quarter of the time each at the low end of the range, the high end, the middle and the low end again.
+/// Four constant levels of equal duration: the low end of the range, the high end, the middle and the low end.
 ///
-/// What goes on while the input stands still is slow: creep follows each step, a drift does not, and a drifting
-/// gain shows only away from zero.
+/// While the input is constant, only slow effects change the output. They can be told apart: creep follows each step,
+/// drift does not, and a drifting gain is visible only away from zero.
 ///
 /// Parameters
 /// ----------
@@ -183,7 +183,7 @@ fn decaying_triangle(
 /// Raises
 /// ------
 /// ParameterError
-///     A parameter out of its range, fewer than four samples.
+///     A parameter is out of its range, or there are fewer than four samples.
 ///
 /// Examples
 /// --------

@@ -1,4 +1,4 @@
-//! The way from a result's methods that show it to the package's modules that draw and write.
+//! Calls of the package's Python modules that draw results and show them in notebooks.
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -15,7 +15,7 @@ pub(crate) fn plot<'py>(
     module.call_method(name, (result,), Some(&options))
 }
 
-/// What a notebook shows of a result.
+/// The HTML that a notebook shows for a result.
 pub(crate) fn in_notebook<'py>(
     name: &str,
     result: &Bound<'py, PyAny>,

@@ -1,35 +1,35 @@
 //! Measured records.
 
 use crate::arrays::{experiments, from_matrix, vector};
+use crate::channels::{channels, label, names, units};
 use crate::errors::{parameter, to_python};
 use crate::plotting::{in_notebook, plot};
-use gpi_core::{Channel, Experiment, Matrix, TimeAxis};
+use gpi_core::{Experiment, Matrix, TimeAxis};
 use pyo3::prelude::*;
 
-/// Experiments of one actuator at one sampling rate.
+/// Measured experiments with one actuator at one sampling rate.
 ///
 /// Parameters
 /// ----------
 /// u, y : array_like, shape (samples,) or (samples, channels), or a list of arrays
-///     Input and output, each channel in its own unit; a list of arrays holds one array an experiment.
+///     Input and output, each channel in its own unit. A list holds one array for each experiment.
 /// rate : float
 ///     Sampling rate in Hz.
 /// covariates : array_like, shape (samples,) or (samples, columns), or a list of arrays, optional
 ///     Other measured columns, each in its own unit.
 /// warmup : int or list of int, optional
-///     Samples at the start of each experiment that drive the model but are not scored; none when left
-///     out.
+///     Number of samples at the start of each experiment that drive the model but are not scored; none when left out.
 /// input_names, output_names, covariate_names : list of str, optional
-///     Names of the columns; u, y, x, numbered when there are several.
+///     Names of the columns. When left out, they are u, y and x, with numbers if there are several columns.
 /// input_units, output_units, covariate_units : list of str, optional
-///     Units, as labels.
+///     Units of the columns, which are used as labels.
 ///
 /// Raises
 /// ------
 /// DataError
-///     Samples that are NaN or infinite (column and row are named), unequal lengths, no samples.
+///     A sample is NaN or infinite (the message names column and row), the lengths differ, or there are no samples.
 /// ParameterError
-///     A rate that is not positive, arrays of another shape.
+///     The rate is not positive, or an array has another shape.
 ///
 /// Examples
 /// --------
@@ -41,26 +41,6 @@ use pyo3::prelude::*;
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Record {
     pub(crate) record: gpi_core::Record,
-}
-
-fn channels(
-    letter: &str,
-    count: usize,
-    names: Option<Vec<String>>,
-    units: Option<Vec<String>>,
-) -> PyResult<Vec<Channel>> {
-    let default = |index: usize| {
-        if count == 1 { letter.to_owned() } else { format!("{letter}{}", index + 1) }
-    };
-    let names = names.unwrap_or_else(|| (0..count).map(default).collect());
-    let units = units.unwrap_or_else(|| vec![String::new(); count]);
-    for (what, length) in [("names", names.len()), ("units", units.len())] {
-        if length != count {
-            let message = format!("{length} {what} for `{letter}`, but it has {count} columns");
-            return Err(parameter(message));
-        }
-    }
-    Ok(names.into_iter().zip(units).map(|(name, unit)| Channel::new(name, unit)).collect())
 }
 
 #[derive(FromPyObject)]
@@ -143,7 +123,7 @@ impl Record {
         self.record.experiments().iter().map(|e| from_matrix(py, &e.covariates)).collect()
     }
 
-    /// Samples at the start of each experiment that are not scored.
+    /// Number of samples at the start of each experiment that are not scored.
     #[getter]
     fn warmup(&self) -> Vec<usize> {
         self.record.experiments().iter().map(|e| e.warmup).collect()
@@ -155,7 +135,7 @@ impl Record {
         self.record.rate()
     }
 
-    /// Samples of all experiments together.
+    /// Number of samples of all experiments together.
     #[getter]
     fn samples(&self) -> usize {
         self.record.samples()
@@ -207,8 +187,8 @@ impl Record {
     /// Returns
     /// -------
     /// tuple of Record
-    ///     The first part, and the rest. The rest keeps the first part as its warm-up: it is simulated
-    ///     with its true past and scored only after it.
+    ///     The first part and the second part. The second record contains the first part as its warm-up: a simulation begins
+    ///     there, but only the second part is scored.
     fn split(&self, fraction: f64) -> PyResult<(Self, Self)> {
         let (first, rest) = self.record.split(fraction).map_err(to_python)?;
         Ok((Self { record: first }, Self { record: rest }))
@@ -238,27 +218,16 @@ impl Record {
     }
 
     fn __repr__(&self) -> String {
-        let labels = |channels: &[Channel]| {
-            channels.iter().map(Channel::label).collect::<Vec<_>>().join(", ")
-        };
         let count = self.record.experiments().len();
         let experiments = if count == 1 { String::new() } else { format!("{count} experiments, ") };
         format!(
             "Record({experiments}{} samples at {} Hz, {} -> {})",
             self.record.samples(),
             self.record.rate(),
-            labels(self.record.inputs()),
-            labels(self.record.outputs())
+            label(self.record.inputs()),
+            label(self.record.outputs())
         )
     }
-}
-
-pub(crate) fn names(channels: &[Channel]) -> Vec<String> {
-    channels.iter().map(|channel| channel.name.clone()).collect()
-}
-
-pub(crate) fn units(channels: &[Channel]) -> Vec<String> {
-    channels.iter().map(|channel| channel.unit.clone()).collect()
 }
 
 /// Reads the sampling rate from time stamps.
@@ -271,12 +240,12 @@ pub(crate) fn units(channels: &[Channel]) -> Vec<String> {
 /// Returns
 /// -------
 /// tuple of float
-///     The rate in Hz, and the largest deviation of a step from the median step as a fraction of it.
+///     The rate in Hz, and the largest deviation of a time step from the median step as a fraction of the median step.
 ///
 /// Raises
 /// ------
 /// DataError
-///     Stamps that do not increase, gaps, sampling that is not uniform; the row is named.
+///     The time stamps do not increase, have gaps or are not uniform. The message names the row.
 ///
 /// Examples
 /// --------

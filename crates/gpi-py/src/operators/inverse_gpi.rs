@@ -1,9 +1,12 @@
 //! The inverse of the cascade.
 
+use super::by_channel::by_channel;
+use super::deadzones::Deadzones;
+use super::play_bank::PlayBank;
+use super::states::{read_inverse_state, write_inverse_state};
 use crate::arrays::from_vector;
 use crate::errors::{parameter, to_python};
-use crate::operators::{Deadzones, PlayBank, channels};
-use gpi_core::operators::{InverseGpi as Inverse, InverseState, Operator, OperatorError};
+use gpi_core::operators::{InverseGpi as Inverse, InverseState, Operator};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use std::ffi::CString;
@@ -11,14 +14,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The exact inverse of a cascade: ``u = D^-1[P^-1[v]]``, see ``Gpi.inverse``.
 ///
-/// P^-1 are plays and D^-1 deadzones. What the limits do not reach is clamped: the drive stops at its limit, and the
-/// plays go on from there as they do forwards.
+/// P^-1 is a bank of plays and D^-1 a sum of deadzones. Where v is out of reach, the drive is clamped to its limit, and the
+/// plays continue from there as those of the cascade do.
 ///
 /// Methods
 /// -------
 /// __call__(v)
-///     u from rest, for a signal v of shape (samples,) or (samples, channels) in the unit of v; u is shaped like v, in its
-///     own unit. Warns (``UserWarning``) where v is out of reach.
+///     Return u from rest, for a signal v of shape (samples,) or (samples, channels) in the unit of v; u is shaped like v,
+///     in its own unit. A ``UserWarning`` is issued if samples of v are out of reach.
 ///
 /// Examples
 /// --------
@@ -47,8 +50,8 @@ impl InverseGpi {
 
     /// D^-1 as a curve.
     ///
-    /// The knots, shape (m,), in the unit of z; the drive at each, shape (m,), in the unit of u; the slopes before the first
-    /// one and behind each, shape (m + 1,), in units of u per unit of z.
+    /// A list of the knots, shape (m,), in the unit of z; the drive at each knot, shape (m,), in the unit of u; and the slopes
+    /// before the first knot and after each knot, shape (m + 1,), in units of u per unit of z.
     #[getter]
     fn curve<'py>(&self, py: Python<'py>) -> [Bound<'py, PyAny>; 3] {
         let curve = self.inverse.curve();
@@ -56,19 +59,19 @@ impl InverseGpi {
         [curve.knots(), curve.heights(), &slopes].map(|values| from_vector(py, values))
     }
 
-    /// The lowest and the highest drive u, in the unit of u; infinite where there is no limit.
+    /// The lowest and the highest drive, in the unit of u; infinite where there is no limit.
     #[getter]
     fn limits(&self) -> (f64, f64) {
         self.inverse.drive().into()
     }
 
-    /// The lowest and the highest z, the envelope's outputs at these drives, in the unit of z.
+    /// The envelope's outputs z at the two limits of the drive, in the unit of z.
     #[getter]
     fn reach(&self) -> (f64, f64) {
         self.inverse.reach().into()
     }
 
-    /// The lowest and the highest v, in the unit of v, that are within reach wherever the plays stand.
+    /// The lowest and the highest v that are within reach for every state of the plays, in the unit of v.
     #[getter]
     fn safe(&self) -> (f64, f64) {
         self.inverse.safe().into()
@@ -93,10 +96,10 @@ impl InverseGpi {
     /// Parameters
     /// ----------
     /// v : array_like, shape (samples,) or (samples, channels)
-    ///     What the cascade shall give, in the unit of v; each channel has a state of its own.
+    ///     Desired output of the cascade, in the unit of v; each channel has a state of its own.
     /// state : array_like, shape (1 + n,) or (1 + n, channels), optional
-    ///     The number of samples that were out of reach, then where the plays stand, in the unit of v; zeros (rest)
-    ///     when left out.
+    ///     The number of samples that were out of reach, then the play outputs, in the unit of v; zeros (rest) when left
+    ///     out.
     ///
     /// Returns
     /// -------
@@ -133,7 +136,7 @@ impl InverseGpi {
         out_of_reach: &AtomicU64,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let length = 1 + self.inverse.plays().weights().len();
-        channels(
+        by_channel(
             v,
             ("v", length),
             state,
@@ -142,7 +145,7 @@ impl InverseGpi {
                 let before = state.out_of_reach;
                 self.inverse.block(state, input, output);
                 out_of_reach.fetch_add(u64::from(state.out_of_reach - before), Ordering::Relaxed);
-                write(state)
+                write_inverse_state(state)
             },
         )
     }
@@ -156,25 +159,6 @@ impl InverseGpi {
             );
             return Err(parameter(message));
         }
-        read(&self.inverse, values).map_err(to_python)
+        read_inverse_state(&self.inverse, values).map_err(to_python)
     }
-}
-
-/// From the count, then the plays.
-pub(crate) fn read(
-    inverse: &Inverse<Vec<f64>, Vec<f64>>,
-    values: &[f64],
-) -> Result<InverseState<Vec<f64>>, OperatorError> {
-    let plays = inverse.plays().state_from(values[1..].to_vec())?;
-    Ok(InverseState { plays, out_of_reach: values[0] as u32 })
-}
-
-/// The count, then the plays.
-pub(crate) fn write(state: &InverseState<Vec<f64>>) -> Vec<f64> {
-    let count = std::iter::once(f64::from(state.out_of_reach));
-    count.chain(state.plays.plays().iter().copied()).collect()
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<InverseGpi>()
 }

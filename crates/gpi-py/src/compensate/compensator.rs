@@ -1,20 +1,19 @@
-//! The compensator of one sample at a time.
+//! The causal compensator.
 
 use crate::arrays::from_vector;
 use crate::errors::{parameter, to_python};
-use crate::inverse_hysteresis::{InverseGpi, read, write};
-use crate::operators::channels;
+use crate::operators::{InverseGpi, by_channel, read_inverse_state, write_inverse_state};
 use gpi_core::compensate::StreamingCompensator;
 use gpi_core::operators::{CompensatorState, LagsState, Operator};
 use pyo3::prelude::*;
 
 type State = CompensatorState<Vec<f64>, Vec<f64>>;
 
-/// The drive for a reference, one sample after the other, see ``Model.compensator``.
+/// A causal compensator, which computes the drive one sample at a time, see ``Model.compensator``.
 ///
-/// ``u = D^-1[P^-1[v]]``, ``v = (r - offset - sum_i c_i l_i) / gain``, ``l_i(k+1) = l_i(k) + rate_i (v(k) - l_i(k))``:
-/// what the reference r, slow next to the dynamics, asks of hysteresis and creep. ``gpi export`` writes the same in C or
-/// in Rust.
+/// ``u = D^-1[P^-1[v]]`` with ``v = (r - offset - sum_i c_i l_i) / gain`` and
+/// ``l_i(k+1) = l_i(k) + rate_i (v(k) - l_i(k))``. The reference r must be slow compared with the dynamics. ``gpi export``
+/// writes the same compensator in C or in Rust.
 ///
 /// Examples
 /// --------
@@ -38,7 +37,7 @@ impl Compensator {
         InverseGpi::new(self.found.compensator.hysteresis().clone())
     }
 
-    /// DC gain from v to the output, creep apart, in output units per unit of v.
+    /// DC gain from v to the output without creep, in output units per unit of v.
     #[getter]
     fn gain(&self) -> f64 {
         self.found.compensator.gain()
@@ -50,42 +49,43 @@ impl Compensator {
         self.found.compensator.offset()
     }
 
-    /// By what fraction of their distance to v the lags of creep move a sample, ``1 - exp(-1 / (T_i rate))``, shape (lags,).
+    /// Rates of creep, shape (lags,): the fraction of its distance to v that each lag moves in one sample,
+    /// ``1 - exp(-1 / (T_i rate))``.
     #[getter]
     fn creep_rates<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, self.found.compensator.creep().rates())
     }
 
-    /// c_i of creep, in output units per unit of v, shape (lags,).
+    /// Gains c_i of creep, in output units per unit of v, shape (lags,).
     #[getter]
     fn creep_gains<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, self.found.compensator.creep().gains())
     }
 
-    /// Names of the parts of the model that the drive undoes.
+    /// Names of the parts of the model that the drive compensates.
     #[getter]
     fn compensated(&self) -> Vec<&'static str> {
         self.found.compensated.clone()
     }
 
-    /// Names of the parts that it does not undo, with the reason.
+    /// Names of the parts of the model that the drive does not compensate, with the reason.
     #[getter]
     fn left(&self) -> Vec<(&'static str, &'static str)> {
         self.found.left.clone()
     }
 
-    /// The state of an actuator that was brought from zero to a reference long ago, for ``run``.
+    /// The steady state after a step of the reference from zero, for ``run``.
     ///
     /// Parameters
     /// ----------
     /// reference : float
-    ///     What the output stands at, in its unit.
+    ///     Constant value of the output, in its unit.
     ///
     /// Returns
     /// -------
     /// ndarray, shape (2 + plays + 2 lags,)
-    ///     The last drive, in the input's unit, the number of samples out of reach, where plays and lags stand and what
-    ///     rounding took from the lags, in the unit of v.
+    ///     The last drive, in the input's unit; the number of samples out of reach; the outputs of the plays and of the
+    ///     lags, and the rounding errors of the lags, in the unit of v.
     fn standing_at<'py>(&self, py: Python<'py>, reference: f64) -> PyResult<Bound<'py, PyAny>> {
         if !reference.is_finite() {
             return Err(parameter(format!("`reference` = {reference} must be a finite number")));
@@ -98,9 +98,9 @@ impl Compensator {
     /// Parameters
     /// ----------
     /// reference : array_like, shape (samples,)
-    ///     What the output shall do, in its unit, at the model's rate; a sample that is not finite holds the drive.
+    ///     Desired output, in its unit, at the model's rate. The drive is held at samples that are not finite.
     /// state : array_like, shape (2 + plays + 2 lags,)
-    ///     As ``standing_at`` or the last call returned it, each in its own unit.
+    ///     The state that ``standing_at`` or the last call returned, each number in its own unit.
     ///
     /// Returns
     /// -------
@@ -113,7 +113,7 @@ impl Compensator {
         state: &Bound<'py, PyAny>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let compensator = &self.found.compensator;
-        channels(
+        by_channel(
             reference,
             ("reference", self.length()),
             Some(state),
@@ -159,20 +159,21 @@ impl Compensator {
             values[1..].split_at(self.length() - 1 - 2 * compensator.creep().gains().len());
         let (lags, carried) = creep.split_at(creep.len() / 2);
         Ok(State {
-            hysteresis: read(compensator.hysteresis(), hysteresis).map_err(to_python)?,
+            hysteresis: read_inverse_state(compensator.hysteresis(), hysteresis)
+                .map_err(to_python)?,
             creep: LagsState { lags: lags.to_vec(), carried: carried.to_vec() },
             drive: values[0],
         })
     }
 }
 
-/// The drive, the plays with their count, the lags and what they carry.
+/// The drive, the samples out of reach, the plays, the lags and their rounding errors.
 fn written(state: &State) -> Vec<f64> {
-    let parts =
-        [&[state.drive], &write(&state.hysteresis)[..], &state.creep.lags, &state.creep.carried];
+    let parts = [
+        &[state.drive],
+        &write_inverse_state(&state.hysteresis)[..],
+        &state.creep.lags,
+        &state.creep.carried,
+    ];
     parts.concat()
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Compensator>()
 }

@@ -1,68 +1,23 @@
-//! State space models and their realization.
+//! State space models.
 
+#![allow(
+    non_snake_case,
+    reason = "A, B, C and D are the arguments' and attributes' names in Python"
+)]
+
+use super::noncausal_fir::NoncausalFir;
+use super::transfer_function::transfer_function;
 use crate::arrays::{
     from_complex, from_matrices, from_matrix, from_signal, from_vector, markov, matrix, signal,
     vector,
 };
-use crate::errors::{parameter, to_python};
-use crate::noncausal_fir::NoncausalFir;
+use crate::errors::to_python;
 use crate::plotting::plot;
-use gpi_core::linear::{self, EraOptions, InverseOptions, TransferFunction};
+use gpi_core::linear::{self, InverseOptions, TransferFunction};
 use nalgebra::DVector;
 use numpy::IntoPyArray;
 use numpy::ndarray::Array3;
 use pyo3::prelude::*;
-
-/// Realizes Markov parameters as a stable state space (Ho-Kalman / ERA), (T1) in the theory.
-///
-/// Parameters
-/// ----------
-/// markov : array_like, shape (taps,) or (outputs, inputs, taps)
-///     H_0, H_1, ..., in output units per input unit.
-/// order : int, optional
-///     Number of states; chosen from the singular values when left out: where they fall by a factor
-///     of 20 at once, or else where the rest holds less than 1e-4 of the sum of their squares.
-/// blocks : int, optional
-///     Block rows and columns of the Hankel matrix; (taps - 1) // 2 - 1 when left out, but no more
-///     than 300 rows or columns.
-///
-/// Returns
-/// -------
-/// StateSpace
-///     Balanced, with the singular values (all, or as many as the order where that is given, at most 12,
-///     and enough for a matrix of 100 rows or more), and with the number of unstable poles that were
-///     reflected into the unit circle.
-///
-/// Raises
-/// ------
-/// ParameterError
-///     An order above the rank, blocks that the taps do not fill, taps that are not finite.
-/// NumericalError
-///     A realization that cannot be made stable.
-///
-/// Examples
-/// --------
-/// >>> import gpi_hammerstein as gpi
-/// >>> truth = gpi.StateSpace.from_transfer_function([1.0, 0.3], [1.0, -1.2, 0.6])
-/// >>> gpi.era(truth.markov(41)).order
-/// 2
-#[pyfunction]
-#[pyo3(name = "era", signature = (markov, order = None, blocks = None))]
-fn realize(
-    py: Python<'_>,
-    markov: &Bound<'_, PyAny>,
-    order: Option<usize>,
-    blocks: Option<usize>,
-) -> PyResult<StateSpace> {
-    let taps = self::markov("markov", markov)?;
-    let options = EraOptions { order, blocks };
-    let era = py.detach(|| linear::realize(&taps, &options)).map_err(to_python)?;
-    Ok(StateSpace {
-        system: era.system,
-        singular_values: Some(era.singular_values),
-        reflected: era.reflected,
-    })
-}
 
 /// A discrete-time linear model: ``x(k+1) = A x(k) + B v(k)``, ``y(k) = C x(k) + D v(k)``.
 ///
@@ -80,9 +35,9 @@ fn realize(
 /// Raises
 /// ------
 /// DataError
-///     Sizes that do not fit together.
+///     The sizes of the matrices do not agree.
 /// ParameterError
-///     Elements that are not finite.
+///     An element is not finite.
 ///
 /// Examples
 /// --------
@@ -107,7 +62,6 @@ impl From<linear::StateSpace> for StateSpace {
 impl StateSpace {
     #[new]
     #[pyo3(signature = (A, B, C, D))]
-    #[allow(non_snake_case)]
     fn new(
         A: &Bound<'_, PyAny>,
         B: &Bound<'_, PyAny>,
@@ -118,71 +72,37 @@ impl StateSpace {
         Ok(linear::StateSpace::new(a, b, c, d).map_err(to_python)?.into())
     }
 
-    /// The controllable canonical form of a transfer function.
-    ///
-    /// Parameters
-    /// ----------
-    /// numerator : array_like, shape (n + 1,), or (outputs, inputs, n + 1)
-    ///     Coefficients, highest power first, in output units per input unit; a shorter vector is filled with zeros in
-    ///     front.
-    /// denominator : array_like, shape (n + 1,)
-    ///     Coefficients, highest power first, no unit.
-    ///
-    /// Returns
-    /// -------
-    /// StateSpace
-    ///     In discrete time if the polynomials are in z, in continuous time if they are in s.
+    #[doc = include_str!("../docs/state_space/from_transfer_function.txt")]
     #[staticmethod]
     fn from_transfer_function(
         numerator: &Bound<'_, PyAny>,
         denominator: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let d = vector("denominator", denominator)?;
-        let numerators = markov("numerator", numerator)?;
-        let one = |n: &[f64]| TransferFunction::new(n, &d).map_err(to_python);
-        if numerators.first().is_some_and(|tap| tap.len() == 1) {
-            let n: Vec<f64> = numerators.iter().map(|tap| tap[0]).collect();
-            return Ok(one(&n)?.to_state_space().map_err(to_python)?.into());
-        }
-        let reference = one(&[])?;
-        if numerators.len() != d.len() {
-            let message = format!(
-                "`numerator` has {} coefficients, but `denominator` has {}",
-                numerators.len(),
-                d.len()
-            );
-            return Err(parameter(message));
-        }
-        let numerator = numerators.into_iter().map(|tap| tap / d[0]).collect();
-        let denominator = reference.denominator;
-        let tf = TransferFunction { numerator, denominator };
-        Ok(tf.to_state_space().map_err(to_python)?.into())
+        let numerator = markov("numerator", numerator)?;
+        let found = transfer_function(numerator, &vector("denominator", denominator)?)?;
+        Ok(found.to_state_space().map_err(to_python)?.into())
     }
 
     /// State matrix, shape (order, order), no unit.
     #[getter]
-    #[allow(non_snake_case)]
     fn A<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrix(py, self.system.a())
     }
 
     /// Input matrix, shape (order, inputs), in units of the state per input unit.
     #[getter]
-    #[allow(non_snake_case)]
     fn B<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrix(py, self.system.b())
     }
 
     /// Output matrix, shape (outputs, order), in output units per unit of the state.
     #[getter]
-    #[allow(non_snake_case)]
     fn C<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrix(py, self.system.c())
     }
 
     /// Feed-through, shape (outputs, inputs), in output units per input unit.
     #[getter]
-    #[allow(non_snake_case)]
     fn D<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrix(py, self.system.d())
     }
@@ -205,26 +125,26 @@ impl StateSpace {
         Ok(from_complex(py, self.system.zeros().map_err(to_python)?))
     }
 
-    /// Largest modulus of a pole, no unit; below 1 the model is stable.
+    /// Largest modulus of the poles, no unit; the model is stable if it is below 1.
     #[getter]
     fn spectral_radius(&self) -> PyResult<f64> {
         self.system.spectral_radius().map_err(to_python)
     }
 
-    /// G(1), shape (outputs, inputs), in output units per input unit.
+    /// DC gain G(1), shape (outputs, inputs), in output units per input unit.
     #[getter]
     fn dc_gain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(from_matrix(py, &self.system.dc_gain().map_err(to_python)?))
     }
 
     /// Singular values of ERA's Hankel matrix, shape (n,), in output units per input unit, descending, all or the
-    /// leading ones (see ``era``); None for a model from elsewhere.
+    /// leading ones (see ``era``); None for a model that ``era`` did not realize.
     #[getter]
     fn singular_values<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyAny>> {
         self.singular_values.as_ref().map(|values| from_vector(py, values))
     }
 
-    /// Unstable poles that ERA reflected into the unit circle.
+    /// Number of unstable poles that ERA reflected into the unit circle.
     #[getter]
     fn reflected(&self) -> usize {
         self.reflected
@@ -232,15 +152,7 @@ impl StateSpace {
 
     /// The output for u, from rest x(0) = 0.
     ///
-    /// Parameters
-    /// ----------
-    /// u : array_like, shape (samples,) or (samples, inputs)
-    ///     Input, in its unit.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray, shape (samples,) or (samples, outputs)
-    ///     y, in the outputs' units; a vector where u is one and there is one output.
+    #[doc = include_str!("../docs/simulate.txt")]
     fn simulate<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         Ok(self.run(u, None)?.0)
     }
@@ -280,7 +192,7 @@ impl StateSpace {
     /// Parameters
     /// ----------
     /// count : int
-    ///     How many.
+    ///     Number of Markov parameters.
     ///
     /// Returns
     /// -------
@@ -329,7 +241,7 @@ impl StateSpace {
         ))
     }
 
-    /// Samples this model, taken as a continuous-time one, with its input held between samples.
+    /// Discretizes this model, which is in continuous time, with a zero-order hold at its input.
     ///
     /// Parameters
     /// ----------
@@ -344,28 +256,7 @@ impl StateSpace {
         Ok(linear::zero_order_hold(&self.system, period).map_err(to_python)?.into())
     }
 
-    /// The noncausal FIR approximation of the inverse (equations 45 and 46 of the paper).
-    ///
-    /// Parameters
-    /// ----------
-    /// r : int, optional
-    ///     Causal taps besides tap 0; chosen from the tolerance when left out.
-    /// d : int, optional
-    ///     Noncausal taps, the preview; chosen from the tolerance when left out.
-    /// tolerance : float
-    ///     Largest truncation error where r or d is chosen, a fraction (``NoncausalFir.error``).
-    ///
-    /// Returns
-    /// -------
-    /// NoncausalFir
-    ///     The inverse with its truncation error.
-    ///
-    /// Raises
-    /// ------
-    /// NumericalError
-    ///     A zero within 1e-4 of the unit circle, an unstable model.
-    /// DataError
-    ///     Unequal numbers of inputs and outputs.
+    #[doc = include_str!("../docs/state_space/noncausal_inverse.txt")]
     #[pyo3(signature = (r = None, d = None, tolerance = 1e-6))]
     fn noncausal_inverse(
         &self,
@@ -380,15 +271,7 @@ impl StateSpace {
 
     /// Draws the Bode plot; see ``gpi_hammerstein.plot.bode``.
     ///
-    /// Parameters
-    /// ----------
-    /// ax : matplotlib.axes.Axes, optional
-    ///     Axes to draw on; those of a new figure when left out.
-    ///
-    /// Returns
-    /// -------
-    /// matplotlib.axes.Axes
-    ///     The axes.
+    #[doc = include_str!("../docs/plot.txt")]
     #[pyo3(signature = (ax = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,
@@ -406,9 +289,4 @@ impl StateSpace {
             self.system.outputs()
         )
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<StateSpace>()?;
-    module.add_function(wrap_pyfunction!(realize, module)?)
 }

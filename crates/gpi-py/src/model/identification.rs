@@ -1,7 +1,7 @@
 //! How a model was identified.
 
 use crate::arrays::from_vector;
-use crate::fir::Fir;
+use crate::linear::Fir;
 use crate::plotting::plot;
 use gpi_core::identify as core;
 use pyo3::prelude::*;
@@ -23,38 +23,38 @@ pub(crate) struct Identification {
 
 #[pymethods]
 impl Identification {
-    /// The paper's first stage, u to y; None where the input excites no more than gain and delay.
+    /// The first estimate of the paper, a FIR model from u to y; None if the input excites only a gain and a delay.
     #[getter]
     fn fir(&self) -> Option<Fir> {
         self.found.fir.clone().map(|fir| Fir { fir })
     }
 
     /// Singular values of ERA's Hankel matrix in the best round, shape (n,), descending, in output units per unit of v;
-    /// none where the input excites no more than gain and delay.
+    /// empty if the input excites only a gain and a delay.
     #[getter]
     fn singular_values<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_vector(py, &self.found.singular_values)
     }
 
-    /// Unstable poles that were reflected into the unit circle.
+    /// Number of unstable poles that were reflected into the unit circle.
     #[getter]
     fn reflected(&self) -> usize {
         self.found.reflected
     }
 
-    /// Taps that the input supports; None when there is no limit in sight.
+    /// Order of persistent excitation of the input, the number of taps that it supports; None if no limit was found.
     #[getter]
     fn supported_taps(&self) -> Option<usize> {
         Some(self.found.supported_taps).filter(|&taps| taps < usize::MAX)
     }
 
-    /// Delay in samples where the linear part is a gain with a delay, else None.
+    /// Delay in samples if the linear part is a gain with a delay, else None.
     #[getter]
     fn delay(&self) -> Option<usize> {
         self.found.delay
     }
 
-    /// What was left after each round, rows of ``rms`` (training data, in the output's unit), ``order``, ``taps``.
+    /// The residual after each round: rows of ``rms`` (training data, in the output's unit), ``order``, ``taps``.
     #[getter]
     fn rounds<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let row = |round: &core::Round| {
@@ -67,10 +67,11 @@ impl Identification {
         self.found.rounds.iter().map(row).collect()
     }
 
-    /// The structures that were compared, in the order they were tried.
+    /// The structures that were compared, in the order in which they were fitted.
     ///
-    /// Rows of ``delay``, ``order``, ``plays``, ``deadzones``, ``rms`` (in the output's unit), ``parameters``, ``used`` (the
-    /// same, counted in samples of white noise), ``criterion`` (``N ln rms^2 + used ln N``, the least is chosen), ``chosen``.
+    /// Rows of ``delay``, ``order``, ``plays``, ``deadzones``, ``rms`` (in the output's unit), ``parameters`` (their number),
+    /// ``used`` (their effective number, corrected for the residual's autocorrelation), ``criterion`` (BIC, ``N ln rms^2 +
+    /// used ln N``; the smallest is chosen), ``chosen``.
     #[getter]
     fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let row = |(place, candidate): (usize, &core::Candidate)| {
@@ -95,7 +96,7 @@ impl Identification {
         self.found.warmups.clone()
     }
 
-    /// What the user should know, in sentences.
+    /// Remarks for the user, each a sentence.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.found.notes.clone()
@@ -125,8 +126,4 @@ impl Identification {
             self.found.rounds.iter().map(|round| format!("{:.4e}", round.rms)).collect();
         format!("Identification(rms by round: {})", rms.join(", "))
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Identification>()
 }

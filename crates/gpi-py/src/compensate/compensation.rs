@@ -1,8 +1,9 @@
-//! Drives that make an output follow a reference.
+//! A drive that makes the outputs follow a reference.
 
 use crate::arrays::{from_signal, from_vector, signal};
+use crate::channels::{names, units};
 use crate::errors::{parameter, to_python};
-use crate::model::figures;
+use crate::figures::figures;
 use crate::plotting::plot;
 use gpi_core::Channel;
 use gpi_core::compensate::{CompensateOptions, Compensation as Found};
@@ -29,7 +30,7 @@ pub(crate) struct Compensation {
 
 #[pymethods]
 impl Compensation {
-    /// Time of each sample of the drive in s, shape (lead + samples,); the reference begins at 0.
+    /// Time of each sample of the drive in s, shape (lead + samples,). The reference begins at 0.
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         let lead = self.found.lead as f64;
@@ -41,56 +42,57 @@ impl Compensation {
     /// Names of the outputs.
     #[getter]
     fn output_names(&self) -> Vec<String> {
-        self.outputs.iter().map(|channel| channel.name.clone()).collect()
+        names(&self.outputs)
     }
 
     /// Units of the outputs.
     #[getter]
     fn output_units(&self) -> Vec<String> {
-        self.outputs.iter().map(|channel| channel.unit.clone()).collect()
+        units(&self.outputs)
     }
 
-    /// u, shape (lead + samples,) or (lead + samples, inputs), in the inputs' units.
+    /// The drive u, shape (lead + samples,) or (lead + samples, inputs), in the inputs' units.
     #[getter]
     fn drive<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_signal(py, self.found.drive.clone(), self.one_dimensional)
     }
 
-    /// The reference with the lead, in which it stands at its first value; the shape of the drive, in the outputs' units.
+    /// The reference, preceded by its first value during the lead; the shape of the drive, in the outputs' units.
     #[getter]
     fn reference<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_signal(py, self.found.reference.clone(), self.one_dimensional)
     }
 
-    /// What the model says that the outputs do, without the effects that no input drives; the shape of the drive, in the
+    /// The outputs that the model predicts, without the effects that no input drives; the shape of the drive, in the
     /// outputs' units.
     #[getter]
     fn predicted<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_signal(py, self.found.predicted.clone(), self.one_dimensional)
     }
 
-    /// Samples by which the drive begins before the reference.
+    /// Number of samples by which the drive begins before the reference.
     #[getter]
     fn lead(&self) -> usize {
         self.found.lead
     }
 
-    /// Reference less prediction over the reference's own samples.
+    /// Error of the prediction, the reference minus ``predicted``, without the lead.
     ///
-    /// As ``Model.error``: ``rms`` and ``max`` in the output's unit, ``nrmse``, ``fit_percent``.
+    /// The figures are those of ``Model.error``: ``rms`` and ``max`` in the output's unit, ``nrmse``, ``fit_percent``.
     #[getter]
     fn error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         figures(py, &self.found.error)
     }
 
-    /// What the outputs do for a drive in proportion to the reference, the straight line through ``drive``, in the
-    /// outputs' units; the shape of the drive.
+    /// The outputs that the model predicts without compensation: for a drive that is a linear function of the reference, the
+    /// regression line of ``drive``; in the outputs' units, the shape of the drive.
     #[getter]
     fn in_proportion<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_signal(py, self.found.in_proportion.clone(), self.one_dimensional)
     }
 
-    /// Reference less ``in_proportion``, as ``error`` (``rms`` and ``max`` in the output's unit).
+    /// Error without compensation, the reference minus ``in_proportion``, with the figures of ``error`` (``rms`` and ``max`` in the
+    /// output's unit).
     #[getter]
     fn error_in_proportion<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         figures(py, &self.found.error_in_proportion)
@@ -102,13 +104,13 @@ impl Compensation {
         from_vector(py, &self.found.passes)
     }
 
-    /// Samples at which a drive stands at a limit because what is asked for lies beyond.
+    /// Number of samples at which a drive is clamped to a limit because the reference is out of reach.
     #[getter]
     fn out_of_reach(&self) -> usize {
         self.found.out_of_reach
     }
 
-    /// Samples at which a drive would have had to be faster than it may be.
+    /// Number of samples at which the slew limit holds a drive back.
     #[getter]
     fn too_fast(&self) -> usize {
         self.found.too_fast
@@ -128,15 +130,7 @@ impl Compensation {
 
     /// Draws the predicted output over the reference; see ``gpi_hammerstein.plot.compensation``.
     ///
-    /// Parameters
-    /// ----------
-    /// ax : matplotlib.axes.Axes, optional
-    ///     Axes to draw on; those of a new figure when left out.
-    ///
-    /// Returns
-    /// -------
-    /// matplotlib.axes.Axes
-    ///     The axes.
+    #[doc = include_str!("../docs/plot.txt")]
     #[pyo3(signature = (ax = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,
@@ -162,7 +156,7 @@ impl Compensation {
     }
 }
 
-/// What `Model.compensate` does.
+/// The drive of `Model.compensate`.
 pub(crate) fn compensate(
     py: Python<'_>,
     model: &gpi_core::Model,
@@ -183,8 +177,4 @@ pub(crate) fn read_limits(limits: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<(f6
     }
     let message = "`limits` must be a pair of numbers, or a list of such pairs";
     limits.extract().map_err(|_| parameter(message.to_owned()))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Compensation>()
 }

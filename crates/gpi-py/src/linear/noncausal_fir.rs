@@ -8,12 +8,13 @@ use pyo3::types::PySlice;
 
 /// A noncausal FIR inverse: ``v(k) = sum_{i=-d}^{r} h_i y(k-i)`` (equation 46 of the paper).
 ///
-/// It comes from ``StateSpace.noncausal_inverse``.
+/// It is returned by ``StateSpace.noncausal_inverse``.
 ///
 /// Methods
 /// -------
 /// __call__(y)
-///     The intermediate signal of y (equation 47), of shape (samples,) or (samples, outputs) in the outputs' units.
+///     Return the intermediate signal (equation 47) of an output y of shape (samples,) or (samples, outputs) in the
+///     outputs' units.
 ///
 /// Examples
 /// --------
@@ -28,25 +29,26 @@ pub(crate) struct NoncausalFir {
 
 #[pymethods]
 impl NoncausalFir {
-    /// h_{-d} .. h_r, shape (inputs, outputs, d + r + 1), those of G, in units of v per output unit.
+    /// h_{-d} .. h_r, shape (inputs, outputs, d + r + 1), in units of v per output unit; inputs and outputs are those of G.
     #[getter]
     fn taps<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_matrices(py, self.inverse.taps[0].shape(), &self.inverse.taps)
     }
 
-    /// Causal taps besides tap 0.
+    /// Number of causal taps besides tap 0.
     #[getter]
     fn r(&self) -> usize {
         self.inverse.causal()
     }
 
-    /// Noncausal taps, the samples of preview.
+    /// Number of noncausal taps, the samples of preview.
     #[getter]
     fn d(&self) -> usize {
         self.inverse.noncausal
     }
 
-    /// Norm of the taps left out as a fraction of all, (T2) in the theory; it bounds the relative error of the response.
+    /// Truncation error, (T2) in the theory: the norm of the omitted taps as a fraction of the norm of all taps. It bounds the
+    /// relative error of the response.
     #[getter]
     fn error(&self) -> f64 {
         self.inverse.error
@@ -63,9 +65,9 @@ impl NoncausalFir {
     }
 }
 
-/// An intermediate signal seen through the inverse.
+/// An estimate of the intermediate signal from the output.
 ///
-/// It comes from a call of ``NoncausalFir``.
+/// It is returned by a call of a ``NoncausalFir``.
 ///
 /// Examples
 /// --------
@@ -81,14 +83,14 @@ pub(crate) struct IntermediateSignal {
 
 #[pymethods]
 impl IntermediateSignal {
-    /// v-hat, shaped like the output it was computed from, in the unit of v; near the ends that output is continued by its
-    /// end values.
+    /// The estimate of v, shaped like the output it was computed from, in the unit of v. Beyond its ends, the output is
+    /// extrapolated by its first and its last value.
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         from_signal(py, self.signal.values.clone(), self.one_dimensional)
     }
 
-    /// The samples whose inverse saw measured outputs only.
+    /// The samples that depend on measured outputs only, not on extrapolated ones.
     #[getter]
     fn valid<'py>(&self, py: Python<'py>) -> Bound<'py, PySlice> {
         let valid = &self.signal.valid;
@@ -100,9 +102,4 @@ impl IntermediateSignal {
         let samples = self.signal.values.nrows();
         format!("IntermediateSignal({samples} samples, valid {}..{})", valid.start, valid.end)
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<NoncausalFir>()?;
-    module.add_class::<IntermediateSignal>()
 }

@@ -1,0 +1,279 @@
+//! Models, and how they were identified and refined. The docstrings of a model's methods stand in `docs/model`.
+
+mod effects;
+mod identification;
+mod refinement;
+mod state;
+
+pub(crate) use identification::Identification;
+pub(crate) use refinement::Refinement;
+
+use crate::arrays::{from_matrix, from_signal, from_vector, signal, vector};
+use crate::channels::{label, names, units};
+use crate::compensate::{self, Compensation, Compensator};
+use crate::errors::to_python;
+use crate::figures::figures;
+use crate::linear::StateSpace;
+use crate::operators::Gpi;
+use crate::plotting::in_notebook;
+use crate::progress::interruptible;
+use crate::record::Record;
+use gpi_core::compensate::CompensateOptions;
+use gpi_core::identify::residuals_from_fitted_start;
+use gpi_core::{Matrix, SimulationError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// A Hammerstein model: ``y = G(q) P[D[u]] + offset``, one hysteresis per input.
+///
+/// Models are returned by ``identify``, ``refine``, ``load`` and ``Model.from_json``.
+///
+/// Examples
+/// --------
+/// >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+/// >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+/// >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+/// >>> model
+/// Model(u -> y, 1 deadzones, 2 plays, linear order 0, 1000 Hz)
+/// >>> model.error(record)["fit_percent"] > 99
+/// True
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct Model {
+    pub(crate) model: gpi_core::Model,
+    pub(crate) identification: Option<Py<Identification>>,
+    pub(crate) refinement: Option<Py<Refinement>>,
+}
+
+impl Model {
+    fn residuals(&self, py: Python<'_>, record: &Record, fit_start: bool) -> PyResult<Vec<Matrix>> {
+        let (model, record) = (&self.model, &record.record);
+        if fit_start {
+            interruptible(py, None, |report| residuals_from_fitted_start(model, record, report))
+        } else {
+            model.residuals(record).map_err(to_python)
+        }
+    }
+}
+
+#[pymethods]
+impl Model {
+    /// Sampling rate in Hz.
+    #[getter]
+    fn rate(&self) -> f64 {
+        self.model.rate()
+    }
+
+    /// The hysteresis of each input.
+    #[getter]
+    fn hysteresis(&self) -> Vec<Gpi> {
+        self.model.hysteresis().iter().map(|h| Gpi { hysteresis: h.clone() }).collect()
+    }
+
+    /// The linear dynamics G, of unit DC gain where one input drives one output.
+    #[getter]
+    fn linear(&self) -> StateSpace {
+        self.model.linear().clone().into()
+    }
+
+    /// Constant term of each output, shape (outputs,), in its unit.
+    #[getter]
+    fn offsets<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, self.model.offsets())
+    }
+
+    /// Names of the inputs.
+    #[getter]
+    fn input_names(&self) -> Vec<String> {
+        names(self.model.inputs())
+    }
+
+    /// Names of the outputs.
+    #[getter]
+    fn output_names(&self) -> Vec<String> {
+        names(self.model.outputs())
+    }
+
+    /// Units of the inputs, empty where unknown.
+    #[getter]
+    fn input_units(&self) -> Vec<String> {
+        units(self.model.inputs())
+    }
+
+    /// Units of the outputs, empty where unknown.
+    #[getter]
+    fn output_units(&self) -> Vec<String> {
+        units(self.model.outputs())
+    }
+
+    /// How the model was identified; None for a model that was loaded.
+    #[getter]
+    fn identification(&self, py: Python<'_>) -> Option<Py<Identification>> {
+        self.identification.as_ref().map(|identification| identification.clone_ref(py))
+    }
+
+    /// How the model was refined, and the uncertainty of its parameters; None for a model that was loaded.
+    #[getter]
+    fn refinement(&self, py: Python<'_>) -> Option<Py<Refinement>> {
+        self.refinement.as_ref().map(|refinement| refinement.clone_ref(py))
+    }
+
+    /// The effects of the model, in the order of the signal chain.
+    ///
+    /// Rows of ``name`` and ``parameters`` (rows of ``name``, ``value`` in ``unit``, and ``unit``, empty for a pure number).
+    #[getter]
+    fn effects<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        effects::rows(py, &self.model)
+    }
+
+    #[doc = include_str!("../docs/model/simulate.txt")]
+    #[pyo3(signature = (u, *, covariates = None))]
+    fn simulate<'py>(
+        &self,
+        u: &Bound<'py, PyAny>,
+        covariates: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (input, one_dimensional) = signal("u", u)?;
+        let output = match covariates {
+            None => self.model.simulate(&input),
+            Some(columns) => self.model.simulate_beside(&input, &signal("covariates", columns)?.0),
+        };
+        Ok(from_signal(u.py(), output.map_err(to_python)?, one_dimensional))
+    }
+
+    #[doc = include_str!("../docs/model/intermediate.txt")]
+    fn intermediate<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let (input, one_dimensional) = signal("u", u)?;
+        let v = self.model.intermediate(&input).map_err(to_python)?;
+        Ok(from_signal(u.py(), v, one_dimensional))
+    }
+
+    #[doc = include_str!("../docs/model/start.txt")]
+    fn start<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let state = self.model.start(&vector("u", u)?).map_err(to_python)?;
+        Ok(from_vector(u.py(), &state::write(&state)))
+    }
+
+    #[doc = include_str!("../docs/model/run.txt")]
+    fn run<'py>(
+        &self,
+        u: &Bound<'py, PyAny>,
+        state: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (input, one_dimensional) = signal("u", u)?;
+        let mut state = state::read(&self.model, &vector("state", state)?)?;
+        let output = self.model.simulate_from(&mut state, &input).map_err(to_python)?;
+        let py = u.py();
+        Ok((from_signal(py, output, one_dimensional), from_vector(py, &state::write(&state))))
+    }
+
+    #[doc = include_str!("../docs/model/error.txt")]
+    #[pyo3(signature = (record, *, remove_mean = false, fit_start = false))]
+    fn error<'py>(
+        &self,
+        py: Python<'py>,
+        record: &Record,
+        remove_mean: bool,
+        fit_start: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let residuals = self.residuals(py, record, fit_start)?;
+        figures(py, &SimulationError::of(&record.record, &residuals, remove_mean))
+    }
+
+    #[doc = include_str!("../docs/model/compensate.txt")]
+    #[pyo3(signature = (reference, *, limits = None, slew = None, quasi_static = false, preview = None, passes = 20))]
+    fn compensate(
+        &self,
+        py: Python<'_>,
+        reference: &Bound<'_, PyAny>,
+        limits: Option<&Bound<'_, PyAny>>,
+        slew: Option<f64>,
+        quasi_static: bool,
+        preview: Option<usize>,
+        passes: usize,
+    ) -> PyResult<Compensation> {
+        let slew = slew.unwrap_or(f64::INFINITY);
+        let limits = compensate::read_limits(limits)?;
+        let options = CompensateOptions { limits, slew, quasi_static, preview, passes };
+        compensate::compensate(py, &self.model, reference, &options)
+    }
+
+    #[doc = include_str!("../docs/model/compensator.txt")]
+    #[pyo3(signature = (*, limits = None))]
+    fn compensator(&self, limits: Option<(f64, f64)>) -> PyResult<Compensator> {
+        let limits = limits.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        self.model.compensator(limits).map(Compensator::new).map_err(to_python)
+    }
+
+    #[doc = include_str!("../docs/model/residual.txt")]
+    #[pyo3(signature = (record, *, fit_start = false))]
+    fn residual<'py>(
+        &self,
+        py: Python<'py>,
+        record: &Record,
+        fit_start: bool,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let residuals = self.residuals(py, record, fit_start)?;
+        Ok(residuals.iter().map(|residual| from_matrix(py, residual)).collect())
+    }
+
+    #[doc = include_str!("../docs/model/to_json.txt")]
+    fn to_json(&self) -> PyResult<String> {
+        self.model.to_json().map_err(to_python)
+    }
+
+    #[doc = include_str!("../docs/model/from_json.txt")]
+    #[staticmethod]
+    fn from_json(text: &str) -> PyResult<Self> {
+        let model = gpi_core::Model::from_json(text).map_err(to_python)?;
+        Ok(Self { model, identification: None, refinement: None })
+    }
+
+    #[doc = include_str!("../docs/model/save.txt")]
+    fn save(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        let files = slf.py().import("gpi_hammerstein.files")?;
+        files.call_method1("save_model", (slf, path))?;
+        Ok(())
+    }
+
+    #[doc = include_str!("../docs/model/plot.txt")]
+    #[pyo3(signature = (record, ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        record: &Bound<'py, PyAny>,
+        ax: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let options = PyDict::new(slf.py());
+        options.set_item("ax", ax)?;
+        let module = slf.py().import("gpi_hammerstein.plot")?;
+        module.call_method("fit", (slf, record), Some(&options))
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        in_notebook("model", slf.as_any())
+    }
+
+    fn __repr__(&self) -> String {
+        let plays = |h: &gpi_core::Hysteresis| {
+            format!(
+                "{} deadzones, {} plays",
+                h.envelope().weights().len(),
+                h.plays().weights().len()
+            )
+        };
+        let hysteresis: Vec<String> = self.model.hysteresis().iter().map(plays).collect();
+        format!(
+            "Model({} -> {}, {}, linear order {}, {} Hz)",
+            label(self.model.inputs()),
+            label(self.model.outputs()),
+            hysteresis.join("; "),
+            self.model.linear().order(),
+            self.model.rate()
+        )
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Model>()?;
+    module.add_class::<Identification>()?;
+    module.add_class::<Refinement>()
+}

@@ -1,0 +1,214 @@
+//! How a model was refined, and the uncertainty of its parameters.
+
+use crate::arrays::{
+    from_complex, from_matrices, from_matrix, from_signal, from_vector, signal, vector,
+};
+use crate::errors::to_python;
+use crate::plotting::plot;
+use gpi_core::Matrix;
+use gpi_core::identify::{self as core, NoiseMethod};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// How a model was refined, and the uncertainty of its parameters.
+///
+/// Examples
+/// --------
+/// >>> u = gpi.multisine(2000, 1000.0, (0.5, 400.0), (0.0, 10.0))
+/// >>> record = gpi.Record(u, gpi.PlayBank([0.0, 2.0], [1.0, 0.5])(u), 1000.0)
+/// >>> model = gpi.identify(record, delay=0, half_widths=[0.0, 2.0], thresholds=0)
+/// >>> [row["name"] for row in model.refinement.parameters[:2]]
+/// ['u.weights[0]', 'u.weights[1]']
+#[pyclass(module = "gpi_hammerstein", frozen)]
+pub(crate) struct Refinement {
+    pub(crate) refinement: core::Refinement,
+}
+
+impl Refinement {
+    /// (outputs, inputs).
+    fn shape(&self) -> (usize, usize) {
+        self.refinement.bands.shape()
+    }
+}
+
+#[pymethods]
+impl Refinement {
+    /// How the optimization ended: ``converged``, ``stalled`` (no step reduces the cost) or ``limit`` (of the number of steps).
+    #[getter]
+    fn status(&self) -> &'static str {
+        self.refinement.status.name()
+    }
+
+    /// Root mean square residual at the start and after every accepted step, shape (steps + 1,), in the output's unit. Several
+    /// outputs are weighted by their residuals.
+    #[getter]
+    fn history<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, &self.refinement.history)
+    }
+
+    /// The estimated parameters: rows of ``name``, ``value`` and ``std``, both in the parameter's own unit.
+    ///
+    /// ``std`` is None if the parameter is unidentifiable, and 0 for a weight at its bound. Weights and half-widths are numbered
+    /// as in ``model.hysteresis[i].plays``, deadzones as in its ``envelope``. ``section[i].a1`` and so on are the coefficients of
+    /// G, written as a sum of parallel sections ``(b1 z + b2 + ..) / (z^2 + a1 z + a2)``; ``poles`` is easier to interpret.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let row = |parameter: &core::Parameter| {
+            let row = PyDict::new(py);
+            row.set_item("name", &parameter.name)?;
+            row.set_item("value", parameter.value)?;
+            row.set_item("std", Some(parameter.deviation).filter(|std| std.is_finite()))?;
+            Ok(row)
+        };
+        self.refinement.parameters.iter().map(row).collect()
+    }
+
+    /// Covariance of ``parameters``, (T5) in the theory, shape (parameters, parameters), each in the product of two units.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_matrix(py, &self.refinement.covariance)
+    }
+
+    /// Unidentifiable parameters: the linear combinations of parameters that the data do not determine.
+    ///
+    /// Each combination is a list of pairs of name and coefficient (a pure number of either sign), the largest coefficient first.
+    #[getter]
+    fn undetermined(&self) -> Vec<Vec<(String, f64)>> {
+        self.refinement.undetermined.clone()
+    }
+
+    /// Root mean square residual of each output on the training data, shape (outputs,), in its unit.
+    #[getter]
+    fn residual_rms<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_vector(py, &self.refinement.residual_rms)
+    }
+
+    /// Measured minus simulated output of each experiment, each (samples, outputs), in the outputs' units. The simulation
+    /// starts from the estimated initial states.
+    #[getter]
+    fn residuals<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
+        self.refinement.residuals.iter().map(|residual| from_matrix(py, residual)).collect()
+    }
+
+    /// The noise floor of each output; (T6) in the theory if the input is periodic.
+    ///
+    /// ``rms`` (list, in the outputs' units), ``how`` (``repeated-periods``, ``rests`` or ``high-frequency-residual``), and the
+    /// ``period`` (in samples) or the number of ``samples`` from which it was estimated.
+    #[getter]
+    fn noise_floor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let floor = &self.refinement.noise_floor;
+        let result = PyDict::new(py);
+        result.set_item("rms", floor.rms.clone())?;
+        result.set_item("how", floor.method.name())?;
+        match floor.method {
+            NoiseMethod::RepeatedPeriods { period } => result.set_item("period", period)?,
+            NoiseMethod::Rests { samples } => result.set_item("samples", samples)?,
+            NoiseMethod::HighFrequencyResidual => {}
+        }
+        Ok(result)
+    }
+
+    /// Number of isolated outliers in the residual.
+    #[getter]
+    fn outliers(&self) -> usize {
+        self.refinement.outliers
+    }
+
+    /// Whether Huber's loss was used.
+    #[getter]
+    fn robust(&self) -> bool {
+        self.refinement.robust
+    }
+
+    /// Poles of G without those of its dead time, and their standard deviations.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray of complex, each of shape (n,)
+    ///     The poles, and the standard deviations of their real parts (in the real part) and imaginary parts (in the
+    ///     imaginary part); no unit.
+    fn poles<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let poles = self.refinement.bands.poles().map_err(to_python)?;
+        Ok((from_complex(py, poles.poles), from_complex(py, poles.deviations)))
+    }
+
+    /// Standard deviations of the first Markov parameters of G.
+    ///
+    /// Parameters
+    /// ----------
+    /// count : int
+    ///     Number of Markov parameters.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (outputs, inputs, count)
+    ///     The standard deviations, in output units per unit of v.
+    fn markov_std<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyAny>> {
+        let deviations = self.refinement.bands.markov_deviations(count).map_err(to_python)?;
+        Ok(from_matrices(py, self.shape(), &deviations))
+    }
+
+    /// Standard deviations of the frequency response of G.
+    ///
+    /// Parameters
+    /// ----------
+    /// angles : array_like, shape (angles,)
+    ///     w in radians per sample: 2 pi f / rate.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray, each of shape (angles, outputs, inputs)
+    ///     The standard deviations of ``ln |G|`` (no unit; times 8.686 in dB) and of the phase in radians.
+    fn response_std<'py>(
+        &self,
+        angles: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let py = angles.py();
+        let angles = vector("angles", angles)?;
+        let found =
+            py.detach(|| self.refinement.bands.response_deviations(&angles)).map_err(to_python)?;
+        let stack = |part: fn(&core::ResponseDeviation) -> &Matrix| {
+            let values: Vec<Matrix> = found.iter().map(|at| part(at).clone()).collect();
+            from_matrices(py, self.shape(), &values).call_method1("transpose", (2, 0, 1))
+        };
+        Ok((stack(|at| &at.log_magnitude)?, stack(|at| &at.phase)?))
+    }
+
+    /// Standard deviations of the intermediate signal v for the input u, from rest.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (samples,) or (samples, inputs)
+    ///     Input, in its unit.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shaped like u
+    ///     The standard deviations, in the unit of v.
+    fn loop_std<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let (input, one_dimensional) = signal("u", u)?;
+        let found = self.refinement.bands.loop_deviations(&input).map_err(to_python)?;
+        Ok(from_signal(u.py(), found, one_dimensional))
+    }
+
+    /// Draws the residual over the steps; see ``gpi_hammerstein.plot.history``.
+    ///
+    #[doc = include_str!("../docs/plot.txt")]
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        plot("history", slf.as_any(), ax)
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Refinement({}, {} parameters, rms {:.4e} -> {:.4e})",
+            self.refinement.status.name(),
+            self.refinement.parameters.len(),
+            self.refinement.history.first().copied().unwrap_or(f64::NAN),
+            self.refinement.history.last().copied().unwrap_or(f64::NAN)
+        )
+    }
+}
