@@ -1,7 +1,7 @@
-"""Write the example of `firmware`: a declared model, its numbers in Rust, its compensators by `gpi export`.
+"""Write the example of `firmware`: a model, its parameters in Rust, and its compensators from `gpi export`.
 
-The actuator has 17 deadzones, 8 plays, two lags of creep and a resonance: made up, of the size of a
-piezo stage for 120 V.
+The actuator has 17 deadzones, 8 plays, two lags of creep and a resonance. Its parameters are invented, with the
+magnitudes of a piezo stage for 120 V.
 """
 
 import json
@@ -25,7 +25,7 @@ OFFSET = 2.0
 
 
 def resonance(frequency: float, damping: float) -> dict[str, list[float]]:
-    """Return a lightly damped mode of unit DC gain, as rows."""
+    """Return the matrices of a lightly damped mode of unit DC gain, as rows."""
     w = 2 * np.pi * frequency / RATE
     radius = np.exp(-damping * w)
     a1, a2 = -2 * radius * np.cos(w * np.sqrt(1 - damping**2)), radius**2
