@@ -1,7 +1,7 @@
 """Compare the run time of the same work in this package, NumPy, numba, python-control and a C loop.
 
-Every round runs each tool once, one after the other, so that other load of the machine affects all of them. The
-table contains the medians of the rounds. `make bench-peers` writes docs/benchmarks.md.
+Every round runs each tool once, one after the other, so that other load of the machine affects all of them.
+The table contains the medians of the rounds. `make bench-peers` writes docs/benchmarks.md.
 """
 
 import argparse
@@ -36,12 +36,12 @@ HEADER = """# Benchmarks
 Made by `make bench-peers` on {machine}.
 
 All functions are called from Python on NumPy arrays. All run on one thread, with two exceptions: rows that
-name two threads, and NumPy's `lstsq` and decompositions, which use as many threads as they choose. The C loop is
-compiled with `-O3`. The columns from `copy` on are the time of the other tool divided by the time of this package: if
-the value is above 1, this package is faster. Each time is the median of several rounds, in which each tool runs once.
-`copy` is NumPy's copy of the input into new memory, which is a lower bound for every tool. In the rows of `FIR`,
-NumPy runs `lstsq`. In the rows of `ERA`, NumPy runs only the singular value decomposition. Order 6 needs only the
-leading singular values, and order 13 needs all of them.
+name two threads, and NumPy's `lstsq` and decompositions, which use as many threads as they choose. The C
+loop is compiled with `-O3`. The columns from `copy` on are the time of the other tool divided by the time
+of this package: if the value is above 1, this package is faster. Each time is the median of several rounds,
+in which each tool runs once. `copy` is NumPy's copy of the input into new memory, which is a lower bound
+for every tool. In the rows of `FIR`, NumPy runs `lstsq`. In the rows of `ERA`, NumPy runs only the singular
+value decomposition. Order 6 needs only the leading singular values, and order 13 needs all of them.
 
 """
 
@@ -253,8 +253,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--markdown", type=Path, help="file to write the table to, for example docs/benchmarks.md")
-    parser.add_argument("--rounds", type=int, default=7, help="number of rounds; the medians are taken over them")
+    parser.add_argument(
+        "--markdown", type=Path, help="file to write the table to, for example docs/benchmarks.md"
+    )
+    parser.add_argument(
+        "--rounds", type=int, default=7, help="number of rounds; the medians are taken over them"
+    )
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         loop = Loop(Path(folder))

@@ -1,8 +1,8 @@
 """Write the answers of `explain` on the blind records. The project does not have the labels of these records.
 
 The records are in `blind/exam` of the data folder (`GPI_DATA_DIR`, else `../shared`). An answer contains the
-effects in the order in which they were added, the verdict, the error before and after, the noise floor, and the
-run time.
+effects in the order in which they were added, the verdict, the error before and after, the noise floor, and
+the run time.
 """
 
 import argparse
@@ -74,7 +74,9 @@ def examine(names: list[str]) -> dict[str, Any]:
 def main() -> None:
     """Explain all records, or only those that are named, and write the answers."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", nargs="+", metavar="RECORD", help="explain only these records, and print their answers")
+    parser.add_argument(
+        "--only", nargs="+", metavar="RECORD", help="explain only these records, and print their answers"
+    )
     arguments = parser.parse_args()
     names = sorted(path.name.removesuffix(SUFFIX) for path in EXAM.glob(f"*{SUFFIX}"))
     if not names:

@@ -1,4 +1,6 @@
-"""Measure the cost of one compensator sample on a Cortex-M4F and on the host; print it or write docs/firmware.md.
+"""Measure the cost of one compensator sample on a Cortex-M4F and on the host.
+
+The result is printed or written to docs/firmware.md.
 
 Needs `qemu-system-arm`, `arm-none-eabi-gcc` and the Rust target. QEMU counts instructions, not cycles. On a
 real processor, a branch that is taken needs additional cycles, and a load from flash may have to wait.
@@ -22,18 +24,19 @@ ROWS = {
 }
 TEXT = """# On a microcontroller
 
-Made by `make firmware-cost` on {host}: Rust {rust}, {gcc} for the microcontroller. Both compilers
-optimise for speed. The compensator computes the drive from one sample of the reference in `f32`. It has {size}.
-The folder `firmware` contains the program.
+Made by `make firmware-cost` on {host}: Rust {rust}, {gcc} for the microcontroller. Both compilers optimise
+for speed. The compensator computes the drive from one sample of the reference in `f32`. It has {size}. The
+folder `firmware` contains the program.
 
 | compensator | instructions, Cortex-M4F | ns, host |
 |---|---|---|
 {rows}
 
-Instructions are counted by QEMU ({qemu}, `-icount shift=0`). A real processor needs some more cycles
-for each branch that is taken. The direct implementations have no limits and do not compensate the rounding errors of
-slow lags. The other ones are faster for two reasons. If v rises, no play moves down, so that each play needs only one
-comparison. The deadzones are one piecewise linear curve, and a binary search finds the segment.
+Instructions are counted by QEMU ({qemu}, `-icount shift=0`). A real processor needs some more cycles for
+each branch that is taken. The direct implementations have no limits and do not compensate the rounding
+errors of slow lags. The other ones are faster for two reasons. If v rises, no play moves down, so that each
+play needs only one comparison. The deadzones are one piecewise linear curve, and a binary search finds the
+segment.
 """
 
 
@@ -59,7 +62,9 @@ def processor() -> str:
 def main() -> None:
     """Count instructions, measure times, and print or write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--markdown", type=Path, help="file to write the page to, for example docs/firmware.md")
+    parser.add_argument(
+        "--markdown", type=Path, help="file to write the page to, for example docs/firmware.md"
+    )
     markdown = parser.parse_args().markdown
     instructions, times = run("--target", TARGET), run()
     rows = []
@@ -71,7 +76,7 @@ def main() -> None:
         rust=first_line("rustc", "--version").split()[1],
         gcc=first_line("arm-none-eabi-gcc", "--version"),
         qemu=first_line("qemu-system-arm", "--version").split("(")[0].strip(),
-        size="8 plays, 17 deadzones, two lags of creep",
+        size="8 plays, 17 deadzones and two lags of creep",
         rows="\n".join(rows),
     )
     if markdown is None:

@@ -1,8 +1,8 @@
 """Write the demo record of the package, and the effects that its simulator contained.
 
-The stage comes from the simulator of the tests, which shares no code with the package. It has hysteresis before a
-resonance, and two effects that the declared model does not contain: creep and mains hum. Run this script again
-after a change of the simulator. The same seed gives the same files.
+The stage comes from the simulator of the tests, which shares no code with the package. It has hysteresis
+before a resonance, and two effects that the declared model does not contain: creep and mains hum. Run this
+script again after a change of the simulator. The same seed gives the same files.
 """
 
 import gzip

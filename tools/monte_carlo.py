@@ -1,8 +1,8 @@
 """Print the scatter of estimates and the coverage of their confidence intervals over repeated refinements.
 
-The simulated plant has four plays, two deadzones and a resonance. The output contains noise at a signal-to-noise
-ratio of 40 dB. Every refinement starts from perturbed parameters. Run it from the root of the project:
-`python tools/monte_carlo.py`.
+The simulated plant has four plays, two deadzones and a resonance. The output contains noise at a
+signal-to-noise ratio of 40 dB. Every refinement starts from perturbed parameters. Run it from the root of the
+project: `python tools/monte_carlo.py`.
 """
 
 import sys

@@ -1,7 +1,8 @@
 """Print how often `explain` names the right effects, and the error before and after.
 
 The records are those with labels under `blind/dev` of the data folder (`GPI_DATA_DIR`, else `../shared`), and
-plants of the tests' simulator that are drawn at random. `python tools/scoreboard.py --help` lists the options.
+plants of the tests' simulator that are drawn at random. `python tools/scoreboard.py --help` lists the
+options.
 """
 
 import argparse
@@ -131,16 +132,34 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--plants", type=int, default=40, help="number of simulated plants")
     parser.add_argument("--seed", type=int, default=1000, help="seed of the first plant")
-    parser.add_argument("--strength", type=float, default=None, help="rms of every effect over that of the noise")
-    parser.add_argument("--seconds", type=float, default=30.0, help="length of the simulated records in s")
-    parser.add_argument("--no-records", dest="records", action="store_false", help="leave out the labelled records")
     parser.add_argument(
-        "--effects", nargs="+", choices=SINGLE, default=SINGLE, metavar="EFFECT", help="draw only these effects"
+        "--strength", type=float, default=None, help="rms of every effect over that of the noise"
+    )
+    parser.add_argument("--seconds", type=float, default=30.0, help="length of the simulated records in s")
+    parser.add_argument(
+        "--no-records", dest="records", action="store_false", help="leave out the labelled records"
+    )
+    parser.add_argument(
+        "--effects",
+        nargs="+",
+        choices=SINGLE,
+        default=SINGLE,
+        metavar="EFFECT",
+        help="draw only these effects",
     )
     parser.add_argument("--power", action="store_true", help="also test single effects near the noise level")
-    parser.add_argument("--power-seeds", type=int, default=3, help="number of plants for each effect and strength")
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="file to write the tables to, for example docs/scoreboard.md")
-    parser.add_argument("--keep", type=Path, metavar="FILE", help="file of results; a stopped run is continued from it")
+    parser.add_argument(
+        "--power-seeds", type=int, default=3, help="number of plants for each effect and strength"
+    )
+    parser.add_argument(
+        "--markdown",
+        type=Path,
+        metavar="FILE",
+        help="file to write the tables to, for example docs/scoreboard.md",
+    )
+    parser.add_argument(
+        "--keep", type=Path, metavar="FILE", help="file of results; a stopped run is continued from it"
+    )
     arguments = parser.parse_args()
     kept = Kept(arguments.keep)
     print(HEAD, flush=True)

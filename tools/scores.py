@@ -14,7 +14,7 @@ ALSO = {"duffing": "stiffness", "preisach": "hysteresis-shape"}
 
 @dataclass(frozen=True)
 class Result:
-    """The result of one record. Errors are divided by the noise; `strength` is that of a single effect, if given."""
+    """The result of one record: errors over the noise, and the strength of a single effect, if given."""
 
     name: str
     wanted: tuple[str, ...]

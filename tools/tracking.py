@@ -1,10 +1,10 @@
 """Measure how well a compensated drive works if the stage has changed since the identification.
 
 A stage of the tests' simulator is identified. Then every parameter of it is changed by up to 5 %, and it gets
-creep and one more mode. It has to follow a triangle of decreasing amplitude. Four drives are compared: a drive
-that is proportional to the reference, and the drives of three models. These models are that of the stage before
-the change, a model that is identified again, and the model of `explain` from a record of the changed stage.
-`--markdown` writes docs/tracking.md.
+creep and one more mode. It has to follow a triangle of decreasing amplitude. Four drives are compared: a
+drive that is proportional to the reference, and the drives of three models. These models are that of the
+stage before the change, a model that is identified again, and the model of `explain` from a record of the
+changed stage. `--markdown` writes docs/tracking.md.
 """
 
 import argparse
@@ -31,25 +31,26 @@ DRIVES = ("in proportion", "as it was", "identified anew", "after `explain`")
 HEAD = ["stage", *DRIVES, "gain", "explained by the change", "noise"]
 TEXT = """# Tracking
 
-Made by `make tracking`. A stage is identified from a record of {seconds:g} s. The stage comes from the simulator of the
-tests, which shares no code with the package. Then every parameter of the stage (travel, half-widths, weights,
-frequencies, damping) is changed by up to {perturbation:.0%}, and the stage gets creep and one more mode, each with an rms of
-{strength:g} times that of the noise. The reference starts at rest, goes to the middle of the range and then
-follows a triangle of decreasing amplitude for {turns} periods at a twentieth of the resonance frequency. The table shows
-the tracking error, rms in per cent of the span of the reference, without the noise of the sensor:
+Made by `make tracking`. A stage is identified from a record of {seconds:g} s. The stage comes from the
+simulator of the tests, which shares no code with the package. Then every parameter of the stage (travel,
+half-widths, weights, frequencies, damping) is changed by up to {perturbation:.0%}, and the stage gets creep
+and one more mode, each with an rms of {strength:g} times that of the noise. The reference starts at rest,
+goes to the middle of the range and then follows a triangle of decreasing amplitude for {turns} periods at a
+twentieth of the resonance frequency. The table shows the tracking error, rms in per cent of the span of the
+reference, without the noise of the sensor:
 
 {table}
 
 The columns are:
 
-- `in proportion`: the drive is proportional to the reference. It is the straight line that fits the drive of the next
-  column best.
+- `in proportion`: the drive is proportional to the reference. It is the straight line that fits the drive
+  of the next column best.
 - `as it was`: the drive is computed by `model.compensate` with a model of the stage before the change.
 - `identified anew`: the model was identified by `identify` from one record of the changed stage.
 - `after explain`: the model was found by `explain` from the same record.
 - `gain`: the error of `in proportion` divided by the error of `after explain`.
-- `explained by the change`: the share of the error of `as it was`, in per cent of its power, that is caused by the
-  difference between the two stages under this drive.
+- `explained by the change`: the share of the error of `as it was`, in per cent of its power, that is caused
+  by the difference between the two stages under this drive.
 - `noise`: the rms of the sensor noise, in per cent of the span of the reference.
 """
 TURNS = 6
@@ -95,7 +96,7 @@ def output(plant: plants.Plant, drive: Array, lead: int) -> Array:
 
 
 def reference(plant: plants.Plant) -> Array:
-    """Return the reference: from rest to the middle of the travel, then a triangle of decreasing amplitude."""
+    """Return the reference: from rest to the middle of the travel, then a decaying triangle."""
     frequency = plant.resonance_hz / 20
     t = np.arange(round(TURNS * RATE / frequency)) / RATE
     triangle = np.interp(t * frequency % 1.0, [0, 0.25, 0.75, 1], [0, 1, -1, 0]) * (1 - t / t[-1])
@@ -140,7 +141,9 @@ def main() -> None:
     """Run all stages, and print or write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--stages", type=int, default=8, help="number of simulated stages")
-    parser.add_argument("--markdown", type=Path, help="file to write the page to, for example docs/tracking.md")
+    parser.add_argument(
+        "--markdown", type=Path, help="file to write the page to, for example docs/tracking.md"
+    )
     arguments = parser.parse_args()
     rows = []
     for seed in range(arguments.stages):
