@@ -1,5 +1,5 @@
-# Every target works from a bare clone: it sets up `.venv` and builds the bindings when they are out of date.
-# Needed: Rust, Python 3.11 or newer, make. Another interpreter: `make PYTHON=python3.13 test`.
+# Every target works from a fresh clone: it creates `.venv` and builds the bindings if they are out of date.
+# Requirements: Rust, Python 3.11 or newer, make. To use another interpreter: `make PYTHON=python3.13 test`.
 
 PYTHON ?= python3
 VENV := .venv
@@ -8,34 +8,34 @@ FIRMWARE := thumbv7em-none-eabihf
 
 TOOLS := $(VENV)/.tools-installed
 NATIVE := $(VENV)/.native-installed
-# Directories are listed too, so that a deleted file counts as a change.
+# Directories are also listed, so that a deleted file counts as a change.
 NATIVE_SOURCES := pyproject.toml Cargo.toml $(wildcard Cargo.lock crates/*/Cargo.toml) $(shell find crates/*/src)
 NATIVE_MISSING := $(if $(wildcard python/gpi_hammerstein/_native*.so),,FORCE)
 
 heading = @printf '\n== %s ==\n' '$(1)'
 
 .DEFAULT_GOAL := help
-# The order of `make test` is part of what it promises, also under `make -j`.
+# `make test` always runs its checks in the same order, also with `make -j`.
 .NOTPARALLEL:
 .PHONY: help demo test lint lint-rust lint-python test-rust test-python bench bench-peers docs figures monte-carlo tracking firmware-cost scoreboard blind-exam clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
 
-demo: $(NATIVE) ## Run `gpi demo`, pictures in out/demo
+demo: $(NATIVE) ## Run `gpi demo` and write its pictures to out/demo
 	$(BIN)/gpi demo -o out/demo
 
-test: $(TOOLS) lint-rust test-rust lint-python test-python ## Check and test everything
+test: $(TOOLS) lint-rust test-rust lint-python test-python ## Run all checks and tests
 
-lint: lint-rust lint-python ## Format, lint and type checks of both languages
+lint: lint-rust lint-python ## Run the format, lint and type checks of both languages
 
-lint-rust: ## rustfmt and clippy
+lint-rust: ## Run rustfmt and clippy
 	$(call heading,Rust: format)
 	cargo fmt --all --check
 	$(call heading,Rust: lint)
 	PYO3_PYTHON=$(PYTHON) cargo clippy --workspace --all-targets -- -D warnings
 
-test-rust: ## Firmware build, unit tests, documentation tests, benchmarks in test mode
+test-rust: ## Build for firmware; run unit tests, documentation tests and the benchmarks in test mode
 	$(call heading,Rust: build without std for $(FIRMWARE))
 	@if [ -d "$$(rustc --print target-libdir --target $(FIRMWARE))" ] || rustup target add $(FIRMWARE); then \
 		cargo build -p gpi-core --no-default-features --target $(FIRMWARE); \
@@ -49,7 +49,7 @@ test-rust: ## Firmware build, unit tests, documentation tests, benchmarks in tes
 	$(call heading,Rust: benchmarks in test mode)
 	cargo test --benches
 
-lint-python: $(NATIVE) ## ruff, mypy, basedpyright and stubtest
+lint-python: $(NATIVE) ## Run ruff, mypy, basedpyright and stubtest
 	$(call heading,Python: lint and format)
 	$(BIN)/python -m ruff check
 	$(BIN)/python -m ruff format --check
@@ -59,11 +59,11 @@ lint-python: $(NATIVE) ## ruff, mypy, basedpyright and stubtest
 	$(call heading,Python: stub of the compiled module)
 	$(BIN)/python -m mypy.stubtest gpi_hammerstein._native
 
-test-python: $(NATIVE) ## pytest
+test-python: $(NATIVE) ## Run pytest
 	$(call heading,Python: tests)
 	$(BIN)/python -m pytest -n auto
 
-docs: $(NATIVE) ## Build the documentation into out/site; its tutorial fetches a record or takes it from GPI_DATA_DIR
+docs: $(NATIVE) ## Build the documentation in out/site; its tutorial downloads a record or reads it from GPI_DATA_DIR
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going docs out/site
 	cargo doc -p gpi-core --no-deps
 	rm -rf out/site/rust && cp -R target/doc out/site/rust
@@ -71,26 +71,26 @@ docs: $(NATIVE) ## Build the documentation into out/site; its tutorial fetches a
 bench: ## Run the benchmarks
 	cargo bench
 
-bench-peers: $(NATIVE) ## Time the same work here and in other tools, into docs/benchmarks.md
+bench-peers: $(NATIVE) ## Compare the run time with other tools and write docs/benchmarks.md
 	$(BIN)/python -m pip install --quiet --group peers
 	$(BIN)/python tools/bench_peers.py --markdown docs/benchmarks.md
 
-figures: $(NATIVE) ## Print the figures of README; needs the measured data
+figures: $(NATIVE) ## Print the figures of README (needs the measured data)
 	$(BIN)/python tools/measured_figures.py
 
-monte-carlo: $(NATIVE) ## Print errors over the Cramer-Rao bound and the coverage of intervals
+monte-carlo: $(NATIVE) ## Print errors over the Cramer-Rao bound and the coverage of confidence intervals
 	$(BIN)/python tools/monte_carlo.py
 
-tracking: $(NATIVE) ## Print how well drives make a changed plant follow a reference, into docs/tracking.md
+tracking: $(NATIVE) ## Measure how well compensated drives work on a changed plant and write docs/tracking.md
 	$(BIN)/python tools/tracking.py --markdown docs/tracking.md
 
-firmware-cost: $(NATIVE) ## Count a compensator's instructions on a Cortex-M4F in QEMU, into docs/firmware.md
+firmware-cost: $(NATIVE) ## Count a compensator's instructions on a Cortex-M4F in QEMU and write docs/firmware.md
 	$(BIN)/python tools/firmware_cost.py --markdown docs/firmware.md
 
-scoreboard: $(NATIVE) ## Print how often `explain` names the right effect; takes long
+scoreboard: $(NATIVE) ## Print how often `explain` names the right effects (takes a long time)
 	$(BIN)/python tools/scoreboard.py
 
-blind-exam: $(NATIVE) ## Write the answers on the blind records to docs/blind-exam.json; takes long
+blind-exam: $(NATIVE) ## Write the answers on the blind records to docs/blind-exam.json (takes a long time)
 	$(BIN)/python tools/blind_exam.py
 
 clean: ## Remove the environment, all builds and all caches
@@ -104,11 +104,11 @@ $(TOOLS): pyproject.toml
 	@command -v cargo >/dev/null || \
 		{ echo "error: cargo not found: install Rust 1.89 or newer" >&2; exit 1; }
 	@command -v $(PYTHON) >/dev/null || \
-		{ echo "error: $(PYTHON) not found: install Python 3.11 or newer, or name one with 'make PYTHON=...'" >&2; exit 1; }
+		{ echo "error: $(PYTHON) not found: install Python 3.11 or newer, or select one with 'make PYTHON=...'" >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-		{ echo "error: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or newer is needed: name one with 'make PYTHON=...'" >&2; exit 1; }
+		{ echo "error: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or newer is required: select one with 'make PYTHON=...'" >&2; exit 1; }
 	@[ -x $(BIN)/python ] || $(PYTHON) -m venv $(VENV) || \
-		{ rm -rf $(VENV); echo "error: no virtual environment could be made (Debian, Ubuntu: install python3-venv)" >&2; exit 1; }
+		{ rm -rf $(VENV); echo "error: the virtual environment cannot be created (Debian, Ubuntu: install python3-venv)" >&2; exit 1; }
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
 	$(BIN)/python -m pip install --quiet --group dev
 	@touch $@

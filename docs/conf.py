@@ -22,7 +22,7 @@ html_css_files = ["site.css"]
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
-# Every page runs as a whole; what fails stops the build.
+# Every page runs completely; an error stops the build.
 nb_execution_mode = "auto"
 nb_execution_raise_on_error = True
 nb_execution_in_temp = True
@@ -33,10 +33,10 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = False
 napoleon_use_ivar = True
-# Shapes such as `(samples, inputs)` stand where types do, and are no references.
+# Shapes such as `(samples, inputs)` are used in place of types and are not references.
 napoleon_use_param = False
 napoleon_use_rtype = False
 # Docstrings quote code with single backticks.
 default_role = "literal"
-# Pages that are not run do not know their language.
+# The language of pages that are not run is unknown.
 suppress_warnings = ["myst-nb.lexer"]

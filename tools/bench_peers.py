@@ -1,7 +1,7 @@
-"""Time the same work here, in NumPy, in numba, in SciPy, in python-control and in a C loop, side by side.
+"""Compare the run time of the same work in this package, NumPy, numba, python-control and a C loop.
 
-Every round runs each of them once, one after the other, so that what the machine does beside it meets all of
-them; the table holds medians. `make bench-peers` writes docs/benchmarks.md.
+Every round runs each tool once, one after the other, so that other load of the machine affects all of them.
+The table contains the medians of the rounds. `make bench-peers` writes docs/benchmarks.md.
 """
 
 import argparse
@@ -35,12 +35,13 @@ HEADER = """# Benchmarks
 
 Made by `make bench-peers` on {machine}.
 
-Called from Python on NumPy arrays; all run on one thread, but for rows that name two here and for NumPy's
-`lstsq` and decompositions, which take as many as they like. The C loop is compiled with `-O3`. Columns from
-`copy` on are the peer's time over ours, medians of rounds in which each runs once: above 1 we are faster.
-`copy` is NumPy's copy of the input into new memory, the least that any of them does. NumPy's part of `FIR`
-is `lstsq`, of `ERA` the singular value decomposition alone, of which `order 6` needs the leading values and
-the other all.
+All functions are called from Python on NumPy arrays. All run on one thread, with two exceptions: rows that
+name two threads, and NumPy's `lstsq` and decompositions, which use as many threads as they choose. The C
+loop is compiled with `-O3`. The columns from `copy` on are the time of the other tool divided by the time
+of this package: if the value is above 1, this package is faster. Each time is the median of several rounds,
+in which each tool runs once. `copy` is NumPy's copy of the input into new memory, which is a lower bound
+for every tool. In the rows of `FIR`, NumPy runs `lstsq`. In the rows of `ERA`, NumPy runs only the singular
+value decomposition. Order 6 needs only the leading singular values, and order 13 needs all of them.
 
 """
 
@@ -63,7 +64,7 @@ void plays(const double *z, double *v, long samples, const double *r, const doub
 
 @numba.njit
 def numba_plays(z: Array, r: Array, p: Array) -> Array:
-    """Return the sum of weighted plays by two loops."""
+    """Return the sum of weighted plays, computed by two loops."""
     v = np.empty_like(z)
     places = np.zeros_like(r)
     for k in range(len(z)):
@@ -98,7 +99,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Row:
-    """One piece of work and how long each took, in seconds."""
+    """One piece of work, and the time that each tool needs for it, in seconds."""
 
     name: str
     samples: int
@@ -106,7 +107,7 @@ class Row:
 
 
 def timed(name: str, samples: int, works: dict[str, Work], rounds: int) -> Row:
-    """Return the median times of works that are run in turn."""
+    """Return the median times of several functions that are run in turn."""
     seconds: dict[str, list[float]] = {peer: [] for peer in works}
     for work in works.values():
         work()
@@ -236,7 +237,7 @@ def line(row: Row) -> str:
 
 
 def machine() -> str:
-    """Say what this ran on."""
+    """Return a description of the machine, the compiler and the packages."""
     names = [row for row in Path("/proc/cpuinfo").read_text().splitlines() if row.startswith("model name")]
     compiler = shutil.which(os.environ.get("CC", "gcc")) or "gcc"
     built = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True).stdout
@@ -248,12 +249,16 @@ def machine() -> str:
 
 
 def main() -> None:
-    """Print the table, and write it where asked."""
+    """Print the table, and write it to a file if one is given."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--markdown", type=Path, help="write the table here")
-    parser.add_argument("--rounds", type=int, default=7, help="rounds that the medians are of")
+    parser.add_argument(
+        "--markdown", type=Path, help="file to write the table to, for example docs/benchmarks.md"
+    )
+    parser.add_argument(
+        "--rounds", type=int, default=7, help="number of rounds; the medians are taken over them"
+    )
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         loop = Loop(Path(folder))

@@ -1,7 +1,8 @@
-"""Write down what `explain` answers on the blind records whose labels the project does not have.
+"""Write the answers of `explain` on the blind records. The project does not have the labels of these records.
 
-Records: `blind/exam` of the data folder (`GPI_DATA_DIR`, else `../shared`). For each: the effects in the
-order they were added, the verdict, the error before and after, the noise floor, and the time it took.
+The records are in `blind/exam` of the data folder (`GPI_DATA_DIR`, else `../shared`). An answer contains the
+effects in the order in which they were added, the verdict, the error before and after, the noise floor, and
+the run time.
 """
 
 import argparse
@@ -26,7 +27,7 @@ PROCESSES = 2
 
 
 def answer(name: str) -> dict[str, Any]:
-    """Explain one record; a refusal is an answer as well."""
+    """Explain one record; a rejection of the record is also an answer."""
     begin = time.perf_counter()
     try:
         found = gpi.explain(gpi.read_record(EXAM / f"{name}{SUFFIX}"))
@@ -46,7 +47,7 @@ def answer(name: str) -> dict[str, Any]:
 
 
 def rounded(value: Any) -> Any:
-    """Return the same with floats of 4 significant digits."""
+    """Return the same value with floats rounded to 4 significant digits."""
     if isinstance(value, Mapping):
         return {key: rounded(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -55,7 +56,7 @@ def rounded(value: Any) -> Any:
 
 
 def examine(names: list[str]) -> dict[str, Any]:
-    """Explain the records and return their answers, sorted by name; progress goes to stderr."""
+    """Explain the records and return their answers, sorted by name; progress is printed on stderr."""
     answers = {}
     with ProcessPoolExecutor(PROCESSES) as pool:
         jobs = {pool.submit(answer, name): name for name in names}
@@ -71,9 +72,11 @@ def examine(names: list[str]) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Examine all records, or those that are named, and write the answers."""
+    """Explain all records, or only those that are named, and write the answers."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", nargs="+", metavar="RECORD", help="print these answers alone")
+    parser.add_argument(
+        "--only", nargs="+", metavar="RECORD", help="explain only these records, and print their answers"
+    )
     arguments = parser.parse_args()
     names = sorted(path.name.removesuffix(SUFFIX) for path in EXAM.glob(f"*{SUFFIX}"))
     if not names:

@@ -1,7 +1,8 @@
-"""Count instructions and time of a sample through 17 deadzones and 8 plays, here and by the definitions.
+"""Count the instructions and the time of one sample through 17 deadzones and 8 plays.
 
-Runs an example of gpi-core under `valgrind --tool=callgrind`, which must be installed, with one and with
-two numbers of samples: what the larger one takes more is what its samples take.
+The operators of this package are compared with a direct implementation of the definitions. The script runs an
+example of gpi-core under `valgrind --tool=callgrind`, which must be installed. It runs the example with two
+numbers of samples; the difference of the two counts is the cost of the additional samples.
 """
 
 import re
@@ -15,7 +16,7 @@ FEW, MANY = 10_000, 30_000
 
 
 def instructions(which: str, samples: int) -> int:
-    """Return the instructions of a run, those of its input left out."""
+    """Return the instructions of a run, without those that generate the input."""
     command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*step*"]
     run = subprocess.run([*command, EXAMPLE, which, str(samples)], capture_output=True, text=True, check=True)
     found = re.search(r"Collected : (\d+)", run.stderr)
@@ -25,14 +26,14 @@ def instructions(which: str, samples: int) -> int:
 
 
 def nanoseconds(which: str) -> float:
-    """Return the shortest time of a sample in some runs."""
+    """Return the shortest time of a sample over several runs."""
     command = [EXAMPLE, which, "1000000"]
     runs = [subprocess.run(command, capture_output=True, text=True, check=True) for _ in range(7)]
     return min(float(run.stdout) for run in runs)
 
 
 def main() -> None:
-    """Print both counts and times and their ratios."""
+    """Print both counts, both times, and their ratios."""
     build = ["cargo", "build", "--release", "--package", "gpi-core", "--example", "one_sample"]
     subprocess.run(build, cwd=ROOT, check=True)
     ways = ("naive", "gpi")

@@ -1,8 +1,8 @@
-"""Writes the demonstration record of the package, and what its simulator put in.
+"""Write the demo record of the package, and the effects that its simulator contained.
 
-The stage comes from the simulator of the tests, which shares no code with the package: hysteresis before a
-resonance, and two effects that no model is told of, creep and mains hum. Run it again after a change; the
-same seed gives the same files.
+The stage comes from the simulator of the tests, which shares no code with the package. It has hysteresis
+before a resonance, and two effects that the declared model does not contain: creep and mains hum. Run this
+script again after a change of the simulator. The same seed gives the same files.
 """
 
 import gzip
@@ -23,12 +23,12 @@ from plants.added import PeriodicDisturbance  # noqa: E402
 DATA = ROOT / "python" / "gpi_hammerstein" / "data"
 SEED = 46
 SECONDS, RATE = 16.0, 1000.0
-# Rms over that of the noise: under one hundredth of the stroke, as an engineer would overlook it.
+# Rms over that of the noise: less than one hundredth of the stroke, so that an engineer might overlook it.
 EFFECTS = {"creep": 12.0, "periodic-disturbance": 4.0}
 
 
 def compressed(run: plants.Recording) -> bytes:
-    """Return the record as CSV under gzip, without name and time: the same record is the same file."""
+    """Return the record as gzipped CSV. It has no file name and no time stamp, so that it is reproducible."""
     columns = zip(run.t, run.u, run.y, strict=True)
     rows = "".join(f"{t:.3f},{u:.4f},{y:.4f}\n" for t, u, y in columns)
     buffer = io.BytesIO()
@@ -38,7 +38,7 @@ def compressed(run: plants.Recording) -> bytes:
 
 
 def main() -> None:
-    """Draw the stage, run one experiment, write it."""
+    """Draw the stage, run one experiment, and write the record."""
     plant = plants.draw(SEED, list(EFFECTS), EFFECTS, SECONDS, RATE)
     run = plant.record(0)
     hum = plant.effects["periodic-disturbance"]

@@ -1,7 +1,7 @@
-"""Write the example of `firmware`: a declared model, its numbers in Rust, its compensators by `gpi export`.
+"""Write the example of `firmware`: a model, its parameters in Rust, and its compensators from `gpi export`.
 
-The actuator has 17 deadzones, 8 plays, two lags of creep and a resonance: made up, of the size of a
-piezo stage for 120 V.
+The actuator has 17 deadzones, 8 plays, two lags of creep and a resonance. Its parameters are invented, with
+the magnitudes of a piezo stage for 120 V.
 """
 
 import json
@@ -25,7 +25,7 @@ OFFSET = 2.0
 
 
 def resonance(frequency: float, damping: float) -> dict[str, list[float]]:
-    """Return a lightly damped mode of unit DC gain, as rows."""
+    """Return the matrices of a lightly damped mode of unit DC gain, as rows."""
     w = 2 * np.pi * frequency / RATE
     radius = np.exp(-damping * w)
     a1, a2 = -2 * radius * np.cos(w * np.sqrt(1 - damping**2)), radius**2
@@ -107,7 +107,7 @@ def numbers(compensator: gpi.Compensator) -> str:
         "thresholds": ("DEADZONES", inverse.envelope.thresholds),
         "slopes": ("DEADZONES", inverse.envelope.weights),
     }
-    lines = ["/* The numbers of `model.json` for `by_hand.c`. */", f"#define OFFSET {np.float32(OFFSET)}f"]
+    lines = ["/* The parameters of `model.json` for `by_hand.c`. */", f"#define OFFSET {np.float32(OFFSET)}f"]
     lines += [f"#define {size} {len(values)}" for size, values in dict(arrays.values()).items()]
     for name, (size, values) in arrays.items():
         texts = ", ".join(f"{np.float32(value)}f" for value in values)
@@ -115,7 +115,7 @@ def numbers(compensator: gpi.Compensator) -> str:
     return "\n".join(lines) + "\n"
 
 
-ACTUATOR = """//! The numbers of `model.json`, and the operators of gpi-core with them.
+ACTUATOR = """//! The parameters of `model.json`, and the operators of gpi-core with these parameters.
 #![allow(clippy::excessive_precision)]
 
 use gpi_core::operators::{
@@ -135,7 +135,7 @@ pub struct Actuator {
     dynamics: StateSpaceStep<f32, 2, 1, 1>,
 }
 
-/// What the actuator remembers.
+/// The state of the actuator.
 pub struct State {
     hysteresis: GpiState<f32, [f32; WEIGHTS.len()]>,
     creep: LagsState<Creep>,
@@ -153,27 +153,27 @@ pub fn actuator() -> Result<Actuator, OperatorError> {
     Ok(Actuator { hysteresis: hysteresis()?, creep, dynamics: StateSpaceStep::new(A, B, C, D)? })
 }
 
-/// What undoes its hysteresis and its creep.
+/// The compensator of its hysteresis and its creep.
 pub fn compensator()
 -> Result<Compensator<[f32; THRESHOLDS.len()], [f32; WEIGHTS.len()], Creep>, OperatorError> {
     let inverse = hysteresis()?.inverse_within(LIMITS[0], LIMITS[1])?;
     Compensator::new(inverse, Lags::new(CREEP_RATES, CREEP_GAINS)?, 1.0, OFFSET)
 }
 
-/// What [`compensator`] remembers.
+/// The state of [`compensator`].
 pub type Remembered = CompensatorState<[f32; WEIGHTS.len()], Creep>;
 
 impl Actuator {
-    /// Driven from zero to this long ago.
+    /// Returns the steady state after the drive has moved from zero to this value.
     pub fn standing_at(&self, drive: f32) -> State {
         let mut hysteresis = self.hysteresis.rest();
         let v = self.hysteresis.step(&mut hysteresis, drive);
-        // of unit DC gain, seen as the first state
+        // the DC gain is one, and the output is the first state
         let dynamics = [v, A[1][0] * v + B[1][0] * v];
         State { hysteresis, creep: self.creep.settled(v), dynamics }
     }
 
-    /// The output for a sample of the drive.
+    /// Returns the output for one sample of the drive.
     pub fn step(&self, state: &mut State, drive: f32) -> f32 {
         let v = self.hysteresis.step(&mut state.hysteresis, drive);
         let [y] = self.dynamics.step(&mut state.dynamics, &[v]);

@@ -1,8 +1,8 @@
-"""Write testdata/*.json from the oracle: small vectors that the Rust and the Python tests read.
+"""Write testdata/*.json from the oracle: small vectors that both the Rust tests and the Python tests read.
 
     python tools/make_testdata.py
 
-Needs NumPy and SciPy only. Matrices are lists of rows; signals are (samples, channels) or, for the
+It needs only NumPy and SciPy. Matrices are lists of rows; signals are (samples, channels) or, for the
 operators, one channel; Markov parameters are (outputs, inputs, taps).
 """
 
@@ -15,13 +15,13 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "python" / "tests"))
 
-import oracle  # noqa: E402  the oracle lives next to the tests
+import oracle  # noqa: E402  the oracle is in the folder of the tests
 
 SEED = 20180627
 
 
 def plain(value):
-    """Arrays as lists, complex numbers as [re, im] pairs."""
+    """Return arrays as lists, and complex numbers as [re, im] pairs."""
     value = np.asarray(value)
     if np.iscomplexobj(value):
         value = np.stack([value.real, value.imag], axis=-1)
@@ -46,7 +46,7 @@ PAPER_SLOPES = [
 
 
 def deadzone_case(name, thresholds, weights, reading, signal, previous=0.0):
-    """One envelope under one signal."""
+    """Return the output of one envelope for one signal."""
     output = oracle.deadzones(signal, thresholds, weights, reading, previous)
     return {
         "name": name,
@@ -60,7 +60,7 @@ def deadzone_case(name, thresholds, weights, reading, signal, previous=0.0):
 
 
 def play_case(name, half_width, signal, start=0.0):
-    """One play under one signal."""
+    """Return the output of one play for one signal."""
     output = oracle.play(signal, half_width, start)
     return {
         "name": name,
@@ -72,7 +72,7 @@ def play_case(name, half_width, signal, start=0.0):
 
 
 def bank_case(name, half_widths, weights, signal, start=None):
-    """One bank under one signal, with its state after it."""
+    """Return the output of one bank for one signal, and its final state."""
     start = [0.0] * len(half_widths) if start is None else start
     output, final = oracle.play_bank(signal, half_widths, weights, start)
     return {
@@ -87,7 +87,7 @@ def bank_case(name, half_widths, weights, signal, start=None):
 
 
 def gpi_case(name, envelope, bank, reading, signal):
-    """Deadzones, then plays, from rest."""
+    """Return the output of deadzones followed by plays, from rest."""
     output, final = oracle.gpi(signal, *envelope, *bank, reading)
     return {
         "name": name,
@@ -103,7 +103,7 @@ def gpi_case(name, envelope, bank, reading, signal):
 
 
 def operators():
-    """All cases of operators.json."""
+    """Return all cases of operators.json."""
     rng = np.random.default_rng(SEED)
     noise = plain(np.round(rng.normal(scale=3, size=40), 3))
     sine = plain(4 * np.sin(2 * np.pi * np.arange(60) / 40))
@@ -172,7 +172,7 @@ CONTINUOUS = [3.391e10], [1.0, 3759.0, 2.063e7, 7.514e10]  # (48)
 
 
 def fir_case(name, experiments, taps, ridge=0.0):
-    """One regression over all experiments."""
+    """Return one regression over all experiments."""
     found = oracle.fir(experiments, taps, ridge)
     return {
         "name": name,
@@ -191,7 +191,7 @@ def fir_case(name, experiments, taps, ridge=0.0):
 
 
 def experiment(rng, samples, taps, offset, noise=0.0, warmup=0):
-    """White input through the Markov parameters `taps`, an offset, white noise."""
+    """Return a white input, and its output for the Markov parameters `taps`, an offset and white noise."""
     outputs, inputs, _ = taps.shape
     u = np.round(rng.normal(size=(samples, inputs)), 2)
     y = oracle.convolve(taps, u) + offset + noise * rng.normal(size=(samples, outputs))
@@ -199,7 +199,7 @@ def experiment(rng, samples, taps, offset, noise=0.0, warmup=0):
 
 
 def era_case(name, markov, order=None, blocks=None):
-    """One realization; A, B, C are unique up to the signs of the states only."""
+    """Return one realization. A, B and C are unique only up to the signs of the states."""
     (a, b, c, d), s = oracle.era(markov, order, blocks)
     return {
         "name": name,
@@ -215,7 +215,7 @@ def era_case(name, markov, order=None, blocks=None):
 
 
 def hold_case(name, system, period):
-    """A continuous state space and its samples."""
+    """Return a continuous-time state space and its zero-order hold."""
     a, b, c, d = system
     sampled = oracle.zero_order_hold(a, b, c, d, period)
     return {
@@ -227,7 +227,7 @@ def hold_case(name, system, period):
 
 
 def paper_hold_case(period):
-    """(48) sampled; at 1e-2 s this is (49)."""
+    """Return (48) with a zero-order hold; at 1e-2 s this is (49)."""
     sampled = oracle.zero_order_hold(*oracle.from_transfer_function(*CONTINUOUS), period)
     numerator, denominator = oracle.to_transfer_function(*sampled)
     return {
@@ -241,7 +241,7 @@ def paper_hold_case(period):
 
 
 def laurent_case(name, system, r, d):
-    """The inverse truncated to -d .. r, and what it makes of a short output."""
+    """Return the inverse truncated to -d .. r, and its result for a short output."""
     lags = 400
     series = oracle.laurent(*system, lags)
     taps = series[:, :, lags - d : lags + r + 1]
@@ -259,7 +259,7 @@ def laurent_case(name, system, r, d):
 
 
 def linear():
-    """All cases of linear.json."""
+    """Return all cases of linear.json."""
     rng = np.random.default_rng(SEED)
     siso = np.array([[[0.5, 1.0, -0.25]]])
     mimo = np.round(rng.normal(size=(2, 2, 3)), 2)
@@ -301,7 +301,7 @@ def linear():
 
 
 def dump(cases):
-    """JSON with one line for each field of a case."""
+    """Return JSON text with one line for each field of a case."""
 
     def line(value):
         return json.dumps(value, allow_nan=False)

@@ -1,7 +1,7 @@
-"""Print what the tool reaches on the measured and blind records, next to the reference figures.
+"""Print the errors on the measured and blind records, next to the reference figures.
 
-The data are looked for in GPI_DATA_DIR (a folder with `measured` and `blind`), else in `../shared`.
-Run it from the project's root: `make figures`.
+The data are searched in GPI_DATA_DIR (a folder with `measured` and `blind`), else in `../shared`.
+Run it from the root of the project: `make figures`.
 """
 
 import json
@@ -22,7 +22,7 @@ RIDGE = 3e-2  # what `identify` uses
 
 
 def piezo() -> None:
-    """Fit on the full-scale sine, test on the record of varying amplitude, mean removed."""
+    """Fit on the full-scale sine, and test on the record of varying amplitude with the mean removed."""
     folder = DATA / "measured" / "piezo-p885-dbo"
     train = gpi.read_record(folder / "model_1hz_fullscale.csv")
     test = gpi.read_record(folder / "test_1hz_varying_amplitude.csv", warmup=200)
@@ -45,14 +45,14 @@ def piezo() -> None:
 
 
 def relative(error: NDArray[np.float64], measured: NDArray[np.float64]) -> float:
-    """Error over measurement, in %, over the lines of one period of 8192 samples up to 3 kHz."""
+    """Return the relative error in % over the spectral lines up to 3 kHz of one period of 8192 samples."""
     lines = slice(1, 3840)
     power = [np.sum(np.abs(np.fft.rfft(x, axis=0)[lines]) ** 2) for x in (error, measured)]
     return float(100 * np.sqrt(power[0] / power[1]))
 
 
 def steering_mirror() -> None:
-    """FIR, ERA and the refined linear model on realisations 0 to 4, tested on 5, second period."""
+    """Fit FIR, ERA and the refined linear model to realisations 0 to 4; test on the second period of 5."""
     folder = DATA / "measured" / "piezo-fsm-cubespec"
     print("piezo-fsm-cubespec, held-out realisation, relative error in % up to 3 kHz")
     print("  targets: FIR 5.2 / 4.4 / 4.1, ERA of order 40 stable and 9 / 8 / 8")
@@ -88,7 +88,7 @@ def steering_mirror() -> None:
 
 
 def blind() -> None:
-    """Clean records: held-out error of `identify` next to the noise."""
+    """Print the held-out error of `identify` on records without effects, next to the noise."""
     folder = DATA / "blind" / "dev"
     labels = json.loads((folder / "labels.json").read_text())
     print("blind/dev without an undeclared effect, held out on another experiment")
@@ -98,7 +98,7 @@ def blind() -> None:
         start = time.perf_counter()
         model = gpi.identify(train)
         seconds = time.perf_counter() - start
-        # Some begin in motion: what was before is fitted to the record, the model is not.
+        # Some records have an unknown initial state: it is fitted to the record, the model is not.
         error = model.error(test, fit_start=True)
         noise = labels[name]["noise_std_um"]
         span = error["rms"] / error["nrmse"]

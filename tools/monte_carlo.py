@@ -1,7 +1,8 @@
-"""Print how sure estimates are, and whether they know it: repeated refinements of a simulated plant.
+"""Print the scatter of estimates and the coverage of their confidence intervals over repeated refinements.
 
-The plant has four plays, two deadzones and a resonance; the output carries noise at 40 dB. Every
-refinement starts from perturbed parameters. Run it from the project's root: `python tools/monte_carlo.py`.
+The simulated plant has four plays, two deadzones and a resonance. The output contains noise at a
+signal-to-noise ratio of 40 dB. Every refinement starts from perturbed parameters. Run it from the root of the
+project: `python tools/monte_carlo.py`.
 """
 
 import sys
@@ -10,7 +11,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "tests"))
 
-import trials  # noqa: E402  the trials live next to the tests that repeat them in small
+import trials  # noqa: E402  the tests repeat these trials with fewer runs
 
 RUNS = 2000
 LARGEST_RATIO = 1.15
@@ -18,7 +19,7 @@ COVERAGE = (0.93, 0.97)
 
 
 def efficiency(found: trials.Trials) -> None:
-    """Errors next to the Cramer-Rao bound."""
+    """Print the errors next to the Cramer-Rao bound."""
     print(f"root mean square error over the Cramer-Rao bound, {RUNS} runs under white noise")
     print(f"  {'parameter':24s} {'value':>9s} {'bound':>9s} {'ratio':>6s} {'coverage':>9s}")
     ratios, inside = found.efficiency(), found.parameters.inside().mean(axis=0)
@@ -30,8 +31,8 @@ def efficiency(found: trials.Trials) -> None:
 
 
 def coverage(name: str, found: trials.Trials) -> None:
-    """Shares of the 95 % intervals that hold the truth."""
-    print(f"95 % intervals that hold the truth, {name}, {RUNS} runs, Huber's loss in {found.robust}")
+    """Print the shares of the 95 % intervals that contain the true value."""
+    print(f"95 % intervals that contain the true value, {name}, {RUNS} runs, Huber's loss in {found.robust}")
     low, high = (100 * limit for limit in COVERAGE)
     for quantity in ("parameters", "markov", "magnitude", "loop"):
         scatter: trials.Scatter = getattr(found, quantity)
@@ -48,6 +49,6 @@ if __name__ == "__main__":
     white = trials.run(RUNS, trials.white)
     efficiency(white)
     coverage("white noise", white)
-    coverage("coloured noise", trials.run(RUNS, trials.coloured))
+    coverage("autocorrelated noise", trials.run(RUNS, trials.coloured))
     coverage("white noise, robust", trials.run(RUNS, trials.white, robust=True))
     print(f"{time.perf_counter() - start:.0f} s")

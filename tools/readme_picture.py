@@ -1,6 +1,6 @@
-"""Draw README's picture, the residual of a measured piezo stack before and after; needs the measured data.
+"""Draw the picture of README: the residual of a measured piezo stack before and after.
 
-Run it from the project's root: `python tools/readme_picture.py`.
+It needs the measured data. Run it from the root of the project: `python tools/readme_picture.py`.
 """
 
 import os
@@ -23,7 +23,7 @@ PICTURE = ROOT / "docs" / "images" / "before-and-after.png"
 
 
 def main() -> None:
-    """Explain the record of full scale and draw what is left."""
+    """Explain the full-scale record and draw the residual."""
     os.environ["GPI_DATA_DIR"] = str(DATA)
     found = gpi.explain(gpi.datasets.load("piezo-p885-dbo"))
     ax = gpi.plot.residual_in_time(found)

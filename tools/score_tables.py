@@ -1,4 +1,4 @@
-"""Tables of many scores, as text and as Markdown."""
+"""Tables of the results of many runs, as text and as Markdown."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -8,19 +8,20 @@ import numpy as np
 
 from scores import Result
 
+OUTSIDE = "outside the catalogue"
 KINDS = ("right", "partly right", "nothing found", "wrong")
 
 
 @dataclass(frozen=True)
 class Table:
-    """A title, the heads of the columns, and cells."""
+    """A title, the headings of the columns, and the cells."""
 
     title: str
     heads: Sequence[str]
     rows: Sequence[Sequence[str]]
 
     def text(self) -> str:
-        """Return columns of equal width."""
+        """Return the table as text, with columns of equal width."""
         lines = [self.heads, *self.rows]
         widths = [max(len(line[column]) for line in lines) for column in range(len(self.heads))]
         cells = [
@@ -29,33 +30,38 @@ class Table:
         return "\n".join([f"\n{self.title}", *(f"  {line.rstrip()}" for line in cells)])
 
     def markdown(self) -> str:
-        """Return a table of Markdown below its title."""
+        """Return the table in Markdown, below its title."""
         lines = [self.heads, ["---"] * len(self.heads), *self.rows]
         return "\n".join([f"## {self.title}", "", *(f"| {' | '.join(line)} |" for line in lines), ""])
 
 
 def singles(results: Iterable[Result]) -> Table:
-    """How often each single effect was found, and what was found instead."""
+    """Return how often each single effect was found, and what was found instead.
+
+    Stages that lack nothing are the row ``none``; stages whose effect is outside the catalogue are a row of
+    their own, because the right answer for them is also that no effect is named.
+    """
     counts: dict[str, Counter[str]] = {}
     for result in results:
         if len(result.wanted) <= 1:
-            wanted = result.wanted[0] if result.wanted else "none"
+            wanted = OUTSIDE if result.is_outside else result.wanted[0] if result.wanted else "none"
             counts.setdefault(wanted, Counter())[", ".join(sorted(result.found)) or "none"] += 1
     rows = []
     for wanted, found in sorted(counts.items()):
-        others = "; ".join(f"{count} x {name}" for name, count in found.most_common() if name != wanted)
-        rows.append((wanted, f"{found[wanted]} of {found.total()}", others))
+        right = "none" if wanted == OUTSIDE else wanted
+        others = "; ".join(f"{count} x {name}" for name, count in found.most_common() if name != right)
+        rows.append((wanted, f"{found[right]} of {found.total()}", others))
     return Table("Single effects", ("wanted", "right", "found instead"), rows)
 
 
 def by_number(results: Iterable[Result]) -> Table:
-    """How right the answers are, by the number of effects that are there.
+    """Count the kinds of answers, by the number of effects that are present.
 
-    Partly right: some of the effects and no other one.
+    An answer is partly right if it names some of the effects and no wrong one.
     """
     counts: dict[str, Counter[str]] = {}
     for result in results:
-        number = "outside the catalogue" if result.is_outside else str(len(result.wanted))
+        number = OUTSIDE if result.is_outside else str(len(result.wanted))
         counts.setdefault(number, Counter())[result.kind()] += 1
     rows = [
         (number, *(str(found[kind]) for kind in KINDS), str(found.total()))
@@ -65,7 +71,11 @@ def by_number(results: Iterable[Result]) -> Table:
 
 
 def power(results: Iterable[Result]) -> Table:
-    """How often a single effect is named, alone, and with false ones, by its rms over that of the noise."""
+    """Return how often a single effect is found, by the ratio of its rms to that of the noise.
+
+    Each cell contains three shares: the effect is named, the answer is right, a false effect is named. The
+    column ``runs`` is the number of runs of the row, over all ratios.
+    """
     groups: dict[str, dict[float, list[Result]]] = {}
     for result in results:
         if result.strength is not None and len(result.wanted) == 1:
@@ -73,18 +83,22 @@ def power(results: Iterable[Result]) -> Table:
                 groups.setdefault(name, {}).setdefault(result.strength, []).append(result)
     strengths = sorted({strength for found in groups.values() for strength in found})
     rows = [
-        (name, *(shares(groups[name].get(strength, [])) for strength in strengths))
+        (
+            name,
+            str(sum(map(len, groups[name].values()))),
+            *(shares(groups[name].get(strength, [])) for strength in strengths),
+        )
         for name in sorted(groups, key=lambda name: (name == "all", name))
     ]
     return Table(
-        "Power: single effects found / right / false, in %, by rms over that of the noise",
-        ("effect", *(f"{strength:g}" for strength in strengths)),
+        "Power: single effects found / right / false, in % of the runs, by rms over that of the noise",
+        ("effect", "runs", *(f"{strength:g}" for strength in strengths)),
         rows,
     )
 
 
 def shares(results: Sequence[Result]) -> str:
-    """Return in how many answers the effect is named, is the only one, and in how many is another one."""
+    """Return the shares of answers that name the effect, that are right, and that name a false effect."""
     if not results:
         return "-"
     marks = [(set(r.wanted) <= set(r.found), r.is_right(), r.has_false()) for r in results]
@@ -92,16 +106,13 @@ def shares(results: Sequence[Result]) -> str:
 
 
 def summary(results: Sequence[Result]) -> Table:
-    """The figures that count."""
+    """Return the most important figures."""
     right = [result for result in results if result.is_right()]
-    clean = [result for result in results if not result.wanted]
-    rows = [
-        ("right", f"{len(right)} of {len(results)}"),
-        (
-            "false alarms where nothing is to be found",
-            f"{sum(bool(result.found) for result in clean)} of {len(clean)}",
-        ),
-    ]
+    rows = [("right", f"{len(right)} of {len(results)}")]
+    for name, is_outside in (("lack nothing", False), ("have an effect outside the catalogue", True)):
+        clean = [result for result in results if not result.wanted and result.is_outside == is_outside]
+        alarms = sum(bool(result.found) for result in clean)
+        rows.append((f"false alarms on stages that {name}", f"{alarms} of {len(clean)}"))
     if right:
         ratios = np.array([result.after for result in right])
         rows.append(

@@ -1,7 +1,8 @@
-"""Print how often `explain` names the right effect, and the error before and after.
+"""Print how often `explain` names the right effects, and the error before and after.
 
-Records: those with labels under `blind/dev` of the data folder (`GPI_DATA_DIR`, else `../shared`), and
-plants of the tests' own simulator, drawn at random. `python tools/scoreboard.py --help` lists the options.
+The records are those with labels under `blind/dev` of the data folder (`GPI_DATA_DIR`, else `../shared`), and
+plants of the tests' simulator that are drawn at random. `python tools/scoreboard.py --help` lists the
+options.
 """
 
 import argparse
@@ -24,18 +25,18 @@ from data_folder import DEV  # noqa: E402
 from gpi_hammerstein.files import write_atomically  # noqa: E402
 from scores import Result, labelled, simulated  # noqa: E402
 
-# Effects of the plants that are drawn one at a time; G's order and delay belong to the declared model here.
+# Effects of the simulated plants. G's order and delay are left out: here, the declared model contains them.
 SINGLE = [name for name in plants.CATALOGUE if name not in ("delay", "linear-dynamics")]
-POWER_STRENGTHS = (0.2, 0.5, 1.0, 2.0, 3.0)  # rms over that of the noise
+POWER_STRENGTHS = (0.2, 0.5, 1.0, 2.0, 3.0)  # rms of the effect over that of the noise
 
 Job = tuple[Callable[..., Result], tuple[object, ...]]
 
 
 class Kept:
-    """Results in a file, from which work that was stopped goes on."""
+    """Results in a file, so that a stopped run can be continued."""
 
     def __init__(self, path: Path | None) -> None:
-        """Read what an earlier run has kept."""
+        """Read the results of an earlier run."""
         self.path = path
         self.results: dict[str, Result] = {}
         if path is not None and path.exists():
@@ -45,16 +46,16 @@ class Kept:
 
     @staticmethod
     def name(job: Job) -> str:
-        """Return what tells jobs apart."""
+        """Return the unique name of a job."""
         function, values = job
         return " ".join([function.__name__, *map(str, values)])
 
     def find(self, job: Job) -> Result | None:
-        """Return the job's result, if it was done before."""
+        """Return the job's result if the file contains it."""
         return self.results.get(self.name(job))
 
     def add(self, job: Job, result: Result) -> Result:
-        """Keep a result."""
+        """Add a result to the file."""
         self.results[self.name(job)] = result
         if self.path is not None:
             known = {name: asdict(result) for name, result in self.results.items()}
@@ -69,7 +70,7 @@ HEAD = (
 
 
 def line(result: Result) -> str:
-    """One record's line below `HEAD`."""
+    """Return the line of one record, below `HEAD`."""
     name = result.name if result.strength is None else f"{result.name} at {result.strength:g}"
     return (
         f"{'  ' if result.is_right() else '! '}{name:34s} {', '.join(result.wanted) or '-':44s} "
@@ -79,7 +80,7 @@ def line(result: Result) -> str:
 
 
 def mixed_work(arguments: argparse.Namespace) -> Iterator[Job]:
-    """Yield the labelled records and plants with none, one, two, three or foreign effects."""
+    """Yield labelled records, and plants with no, one, two or three effects or one outside the catalogue."""
     if arguments.records and (DEV / "labels.json").exists():
         for name in sorted(json.loads((DEV / "labels.json").read_text())):
             yield labelled, (DEV, name)
@@ -98,7 +99,7 @@ def mixed_work(arguments: argparse.Namespace) -> Iterator[Job]:
 
 
 def power_work(arguments: argparse.Namespace) -> Iterator[Job]:
-    """Yield every single effect at every strength on a few plants."""
+    """Yield every single effect at every strength, on a few plants each."""
     for name in arguments.effects:
         for strength in POWER_STRENGTHS:
             for number in range(arguments.power_seeds):
@@ -106,7 +107,7 @@ def power_work(arguments: argparse.Namespace) -> Iterator[Job]:
 
 
 def run(pool: Executor, work: Iterable[Job], kept: Kept) -> list[Result]:
-    """Do the work that is not kept yet, printing one line a record in the order of the work."""
+    """Run the jobs whose results are not in the file, and print one line for each record, in order."""
     jobs = [(job, None if kept.find(job) else pool.submit(job[0], *job[1])) for job in work]
     results = []
     for job, running in jobs:
@@ -118,29 +119,47 @@ def run(pool: Executor, work: Iterable[Job], kept: Kept) -> list[Result]:
 
 
 def as_markdown(tables: Iterable[score_tables.Table]) -> str:
-    """Return the tables below the command that made them."""
+    """Return the tables, below the command that made them."""
     words = iter(sys.argv[1:])
-    # where results are kept changes none of them
+    # the file of earlier results does not change the tables
     told = [word for word in words if word != "--keep" or next(words) is None]
     command = shlex.join(["python", "tools/scoreboard.py", *told])
     return "\n".join([f"# Scoreboard\n\nMade by `{command}`.\n", *(table.markdown() for table in tables)])
 
 
 def main() -> None:
-    """Explain, and print the tables."""
+    """Explain all records, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--plants", type=int, default=40, help="plants of the simulator")
-    parser.add_argument("--seed", type=int, default=1000, help="the first plant's seed")
-    parser.add_argument("--strength", type=float, default=None, help="rms of every effect over the noise")
-    parser.add_argument("--seconds", type=float, default=30.0, help="length of the simulated records")
-    parser.add_argument("--no-records", dest="records", action="store_false", help="plants alone")
+    parser.add_argument("--plants", type=int, default=40, help="number of simulated plants")
+    parser.add_argument("--seed", type=int, default=1000, help="seed of the first plant")
     parser.add_argument(
-        "--effects", nargs="+", choices=SINGLE, default=SINGLE, metavar="EFFECT", help="draw these alone"
+        "--strength", type=float, default=None, help="rms of every effect over that of the noise"
     )
-    parser.add_argument("--power", action="store_true", help="single effects near the noise as well")
-    parser.add_argument("--power-seeds", type=int, default=3, help="plants an effect and strength")
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="such as docs/scoreboard.md")
-    parser.add_argument("--keep", type=Path, metavar="FILE", help="keep results there, go on from those kept")
+    parser.add_argument("--seconds", type=float, default=30.0, help="length of the simulated records in s")
+    parser.add_argument(
+        "--no-records", dest="records", action="store_false", help="leave out the labelled records"
+    )
+    parser.add_argument(
+        "--effects",
+        nargs="+",
+        choices=SINGLE,
+        default=SINGLE,
+        metavar="EFFECT",
+        help="draw only these effects",
+    )
+    parser.add_argument("--power", action="store_true", help="also test single effects near the noise level")
+    parser.add_argument(
+        "--power-seeds", type=int, default=3, help="number of plants for each effect and strength"
+    )
+    parser.add_argument(
+        "--markdown",
+        type=Path,
+        metavar="FILE",
+        help="file to write the tables to, for example docs/scoreboard.md",
+    )
+    parser.add_argument(
+        "--keep", type=Path, metavar="FILE", help="file of results; a stopped run is continued from it"
+    )
     arguments = parser.parse_args()
     kept = Kept(arguments.keep)
     print(HEAD, flush=True)

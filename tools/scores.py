@@ -1,4 +1,4 @@
-"""What `explain` answers on one record whose effects are known, and how right that is."""
+"""The answer of `explain` on one record whose effects are known, and its score."""
 
 import json
 import time
@@ -8,13 +8,13 @@ from pathlib import Path
 import gpi_hammerstein as gpi
 import plants
 
-# What the labels call effects that the catalogue has under another name.
+# Effects whose name in the labels differs from that in the catalogue.
 ALSO = {"duffing": "stiffness", "preisach": "hysteresis-shape"}
 
 
 @dataclass(frozen=True)
 class Result:
-    """One record explained: errors over the noise; `strength` is that of a single effect, if it was given."""
+    """The result of one record: errors over the noise, and the strength of a single effect, if given."""
 
     name: str
     wanted: tuple[str, ...]
@@ -28,15 +28,15 @@ class Result:
     strength: float | None = None
 
     def is_right(self) -> bool:
-        """Whether the effects are those of the label."""
+        """Return whether the effects are those of the label."""
         return sorted(self.wanted) == sorted(self.found)
 
     def has_false(self) -> bool:
-        """Whether an effect was found that is not there."""
+        """Return whether an effect was named that is not present."""
         return not set(self.found) <= set(self.wanted)
 
     def kind(self) -> str:
-        """How right the answer is: right, partly right, nothing found, or wrong."""
+        """Return the kind of answer: right, partly right, nothing found, or wrong."""
         if self.is_right():
             return "right"
         if self.has_false():
@@ -93,5 +93,5 @@ def simulated(seed: int, effects: tuple[str, ...], strength: float | None, secon
 
 
 def as_record(run: plants.Recording) -> gpi.Record:
-    """Return a simulated recording as the package reads one."""
+    """Return a simulated recording as a record of the package."""
     return gpi.Record(run.u, run.y, rate=run.rate, covariates=run.x, input_units=["V"], output_units=["um"])

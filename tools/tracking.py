@@ -1,9 +1,10 @@
-"""How well drives make a plant follow a reference that is not what was identified.
+"""Measure how well a compensated drive works if the stage has changed since the identification.
 
-A stage of the tests' simulator is identified; then every number of it is changed by up to 5 %, it gets
-creep and one more mode, and is to follow a triangle that decays. Four drives: in proportion to the
-reference, by the model of the stage as it was, by a model that is identified anew, and by that of
-`explain` on a record of the stage as it is. `--markdown` writes docs/tracking.md.
+A stage of the tests' simulator is identified. Then every parameter of it is changed by up to 5 %, and it gets
+creep and one more mode. It has to follow a triangle of decreasing amplitude. Four drives are compared: a
+drive that is proportional to the reference, and the drives of three models. These models are that of the
+stage before the change, a model that is identified again, and the model of `explain` from a record of the
+changed stage. `--markdown` writes docs/tracking.md.
 """
 
 import argparse
@@ -30,27 +31,33 @@ DRIVES = ("in proportion", "as it was", "identified anew", "after `explain`")
 HEAD = ["stage", *DRIVES, "gain", "explained by the change", "noise"]
 TEXT = """# Tracking
 
-Made by `make tracking`. A stage of the tests' simulator, which shares no code with the package, is
-identified from a record of {seconds:g} s. Then every number of it (travel, half-widths, weights,
-frequencies, damping) is changed by up to {perturbation:.0%}, and it gets creep and one more mode,
-each of {strength:g} times the noise. From rest it is to go to the middle of its range and to follow
-a triangle that decays, {turns} periods at a twentieth of the resonance. What it misses, rms in per
-cent of the reference's span, without the sensor's noise:
+Made by `make tracking`. A stage is identified from a record of {seconds:g} s. The stage comes from the
+simulator of the tests, which shares no code with the package. Then every parameter of the stage (travel,
+half-widths, weights, frequencies, damping) is changed by up to {perturbation:.0%}, and the stage gets creep
+and one more mode, each with an rms of {strength:g} times that of the noise. The reference starts at rest,
+goes to the middle of the range and then follows a triangle of decreasing amplitude for {turns} periods at a
+twentieth of the resonance frequency. The table shows the tracking error, rms in per cent of the span of the
+reference, without the noise of the sensor:
 
 {table}
 
-`in proportion`: a drive in proportion to the reference, the straight line through the drive of the next
-column. `as it was`: `model.compensate` with the model of the stage before the change. `identified
-anew` and `after explain`: with models from one record of the changed stage, of `identify` and of
-`explain`. `gain`: the first over the last. `explained by the change`: how much of what the drive of
-the stage as it was misses is the difference between the two stages under that drive. `noise`: the
-sensor's, in the same per cent.
+The columns are:
+
+- `in proportion`: the drive is proportional to the reference. It is the straight line that fits the drive
+  of the next column best.
+- `as it was`: the drive is computed by `model.compensate` with a model of the stage before the change.
+- `identified anew`: the model was identified by `identify` from one record of the changed stage.
+- `after explain`: the model was found by `explain` from the same record.
+- `gain`: the error of `in proportion` divided by the error of `after explain`.
+- `explained by the change`: the share of the error of `as it was`, in per cent of its power, that is caused
+  by the difference between the two stages under this drive.
+- `noise`: the rms of the sensor noise, in per cent of the span of the reference.
 """
 TURNS = 6
 
 
 def changed(plant: plants.Plant, seed: int) -> plants.Plant:
-    """Change every number of a stage by up to 5 %."""
+    """Change every parameter of a stage by up to 5 %."""
     random = stream("perturbation", seed)
 
     def near(values: Array) -> Array:
@@ -74,13 +81,13 @@ def changed(plant: plants.Plant, seed: int) -> plants.Plant:
 
 
 def recorded(plant: plants.Plant, seed: int) -> gpi.Record:
-    """Run an experiment on a stage."""
+    """Run an experiment on a stage and return the record."""
     own = plant.record(seed)
     return gpi.Record(own.u, own.y, own.rate)
 
 
 def output(plant: plants.Plant, drive: Array, lead: int) -> Array:
-    """What a stage does under a drive, without noise, from the reference's first sample on."""
+    """Return the output of a stage for a drive, without noise, from the reference's first sample on."""
     noise, plant.noise_std = plant.noise_std, 0.0
     try:
         return plant.simulate(Experiment(drive, RATE, lead, (0, 0)), plant.strengths)
@@ -89,7 +96,7 @@ def output(plant: plants.Plant, drive: Array, lead: int) -> Array:
 
 
 def reference(plant: plants.Plant) -> Array:
-    """From rest to the middle of the travel, then a triangle that decays at a twentieth of the resonance."""
+    """Return the reference: from rest to the middle of the travel, then a decaying triangle."""
     frequency = plant.resonance_hz / 20
     t = np.arange(round(TURNS * RATE / frequency)) / RATE
     triangle = np.interp(t * frequency % 1.0, [0, 0.25, 0.75, 1], [0, 1, -1, 0]) * (1 - t / t[-1])
@@ -100,7 +107,7 @@ def reference(plant: plants.Plant) -> Array:
 
 
 def track(seed: int) -> list[float]:
-    """Return the errors of all drives, their ratio, the share that the change explains, and the noise."""
+    """Return the errors of all drives, the gain, the share explained by the change, and the noise."""
     before = plants.draw(seed, (), seconds=SECONDS, rate=RATE)
     before.in_motion = False
     after = plants.draw(seed, LACKS, STRENGTH, seconds=SECONDS, rate=RATE)
@@ -131,10 +138,12 @@ def track(seed: int) -> list[float]:
 
 
 def main() -> None:
-    """Track on some stages, and print or write the table."""
+    """Run all stages, and print or write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--stages", type=int, default=8)
-    parser.add_argument("--markdown", type=Path, help="write the table there")
+    parser.add_argument("--stages", type=int, default=8, help="number of simulated stages")
+    parser.add_argument(
+        "--markdown", type=Path, help="file to write the page to, for example docs/tracking.md"
+    )
     arguments = parser.parse_args()
     rows = []
     for seed in range(arguments.stages):

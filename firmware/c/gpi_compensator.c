@@ -1,6 +1,6 @@
-/* The drive of u for a reference of y, see gpi_compensator.h.
+/* Compensator: drive of u for a reference of y, see gpi_compensator.h.
  *
- * Compile without -ffast-math: it would take the check of the reference and what creep carries away.
+ * Compile without -ffast-math: it would remove the check of the reference and the correction of rounding errors of creep.
  */
 #include "gpi_compensator.h"
 
@@ -12,16 +12,16 @@ typedef gpi_compensator_real real;
 #define KNOTS 17
 #define LAGS GPI_COMPENSATOR_LAGS
 
-/* v = (reference - offset - what creep adds) / gain */
+/* v = (reference - offset - creep) / gain */
 static const real offset = 2.0f;
 static const real gain = 1.0f;
 static const real standing_gain = 1.08f;
 
-/* Creep: each lag moves by rate (v - lag) a sample, and adds gain times its place. */
+/* Creep: in each sample, each lag changes by rate (v - lag). Its contribution to creep is gain times its value. */
 static const real lag_rates[LAGS] = {0.0049875206f, 0.00019998f};
 static const real lag_gains[LAGS] = {0.03f, 0.05f};
 
-/* The inverse plays, from narrow to wide. */
+/* The inverse plays, by increasing half-width. */
 static const real half_widths[PLAYS] = {
     0.0f, 0.6f, 1.62f, 3.1f, 5.075f, 7.565f,
     11.005f, 16.309f,
@@ -31,7 +31,8 @@ static const real weights[PLAYS] = {
     -0.063137956f, -0.05005406f,
 };
 
-/* The inverse deadzones as a curve: knots, the drive at each, the slopes before the first one and behind each. */
+/* The inverse deadzones as a piecewise linear curve: knots, the drive at each knot, the slope before the first knot and after
+   each knot. */
 static const real knots[KNOTS] = {
     -120.9f, -106.05f, -90.75f, -75.6f, -60.75f, -45.3f,
     -30.3f, -15.0f, 0.0f, 15.0f, 30.15f, 45.75f,
@@ -48,7 +49,7 @@ static const real slopes[KNOTS + 1] = {
     0.98039216f, 0.96153843f, 0.95238096f, 0.98039216f, 0.96153843f, 0.95238096f,
 };
 
-/* The drive's limits, what goes into the deadzones there, and the v between which no limit is met. */
+/* The limits of the drive, the corresponding inputs of the inverse deadzones, and the range of v in which no limit is reached. */
 static const real lowest_drive = -120.0f;
 static const real highest_drive = 120.0f;
 static const real lowest = -120.9f;
@@ -81,7 +82,7 @@ static real fall(real *places, int i, real v)
     return weights[i] * places[i];
 }
 
-/* The first play, without width, stands at the last v: where v rises, no play falls. */
+/* The first play has no width and stores the last v. If v rises, no play moves down. */
 static real step_plays(real *places, real v)
 {
     real a = 0, b = 0, c = 0, d = 0;
@@ -127,7 +128,7 @@ static real drive_for(real z)
     }
 }
 
-/* The v that takes the plays from where they stand to an output. */
+/* Returns the v that moves the plays from their present state to an output. */
 static real input_for(const real *places, real output)
 {
     real v = places[0], reached = 0, slope = 0;
@@ -147,7 +148,7 @@ static real input_for(const real *places, real output)
     return slope > 0 ? v + (output - reached) / slope : v;
 }
 
-/* Moves the plays to v, or to what is within reach of it, and sets the drive. */
+/* Moves the plays to v, or to the nearest v that can be reached, and sets the drive. */
 static real move(gpi_compensator_state *state, real v)
 {
     if (v < safe_below || v > safe_above) {

@@ -1,4 +1,4 @@
-/* The numbers of `model.json` for `by_hand.c`. */
+/* The parameters of `model.json` for `by_hand.c`. */
 #define OFFSET 2.0f
 #define LAGS 2
 #define PLAYS 8

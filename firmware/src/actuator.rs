@@ -1,4 +1,4 @@
-//! The numbers of `model.json`, and the operators of gpi-core with them.
+//! The parameters of `model.json`, and the operators of gpi-core with these parameters.
 #![allow(clippy::excessive_precision)]
 
 use gpi_core::operators::{
@@ -64,7 +64,7 @@ pub struct Actuator {
     dynamics: StateSpaceStep<f32, 2, 1, 1>,
 }
 
-/// What the actuator remembers.
+/// The state of the actuator.
 pub struct State {
     hysteresis: GpiState<f32, [f32; WEIGHTS.len()]>,
     creep: LagsState<Creep>,
@@ -82,27 +82,27 @@ pub fn actuator() -> Result<Actuator, OperatorError> {
     Ok(Actuator { hysteresis: hysteresis()?, creep, dynamics: StateSpaceStep::new(A, B, C, D)? })
 }
 
-/// What undoes its hysteresis and its creep.
+/// The compensator of its hysteresis and its creep.
 pub fn compensator()
 -> Result<Compensator<[f32; THRESHOLDS.len()], [f32; WEIGHTS.len()], Creep>, OperatorError> {
     let inverse = hysteresis()?.inverse_within(LIMITS[0], LIMITS[1])?;
     Compensator::new(inverse, Lags::new(CREEP_RATES, CREEP_GAINS)?, 1.0, OFFSET)
 }
 
-/// What [`compensator`] remembers.
+/// The state of [`compensator`].
 pub type Remembered = CompensatorState<[f32; WEIGHTS.len()], Creep>;
 
 impl Actuator {
-    /// Driven from zero to this long ago.
+    /// Returns the steady state after the drive has moved from zero to this value.
     pub fn standing_at(&self, drive: f32) -> State {
         let mut hysteresis = self.hysteresis.rest();
         let v = self.hysteresis.step(&mut hysteresis, drive);
-        // of unit DC gain, seen as the first state
+        // the DC gain is one, and the output is the first state
         let dynamics = [v, A[1][0] * v + B[1][0] * v];
         State { hysteresis, creep: self.creep.settled(v), dynamics }
     }
 
-    /// The output for a sample of the drive.
+    /// Returns the output for one sample of the drive.
     pub fn step(&self, state: &mut State, drive: f32) -> f32 {
         let v = self.hysteresis.step(&mut state.hysteresis, drive);
         let [y] = self.dynamics.step(&mut state.dynamics, &[v]);

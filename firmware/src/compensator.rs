@@ -1,11 +1,11 @@
-//! The drive of u for a reference of y.
+//! Compensator: drive of u for a reference of y.
 //!
 //! Model: SHA-256 089f1aad1a22257d95d63013d78cd3c506e9470bd22007b8429d520f697149f1 of its file.
 //! Rate: 10000 samples a second.
 //! Reference: y in um.
 //! Drive: u in V, from -120 to 120 V.
-//! Undone: hysteresis, creep.
-//! Left: dynamics: of G only the DC gain is undone.
+//! Compensated: hysteresis, creep.
+//! Not compensated: dynamics: of G only the DC gain is undone.
 //! Made by gpi-hammerstein 0.1.0, `gpi export`.
 
 #![forbid(unsafe_code)]
@@ -17,16 +17,16 @@ const PLAYS: usize = 8;
 const KNOTS: usize = 17;
 const LAGS: usize = 2;
 
-// v = (reference - offset - what creep adds) / gain
+// v = (reference - offset - creep) / gain
 const OFFSET: Real = 2.0;
 const GAIN: Real = 1.0;
 const STANDING_GAIN: Real = 1.08;
 
-// Creep: each lag moves by rate (v - lag) a sample, and adds gain times its place.
+// Creep: in each sample, each lag changes by rate (v - lag). Its contribution to creep is gain times its value.
 const LAG_RATES: [Real; LAGS] = [0.0049875206, 0.00019998];
 const LAG_GAINS: [Real; LAGS] = [0.03, 0.05];
 
-// The inverse plays, from narrow to wide.
+// The inverse plays, by increasing half-width.
 const HALF_WIDTHS: [Real; PLAYS] = [0.0, 0.6, 1.62, 3.1, 5.075, 7.565, 11.005, 16.309];
 const WEIGHTS: [Real; PLAYS] = [
     3.3333333,
@@ -39,7 +39,8 @@ const WEIGHTS: [Real; PLAYS] = [
     -0.05005406,
 ];
 
-// The inverse deadzones as a curve: knots, the drive at each, the slopes before the first one and behind each.
+// The inverse deadzones as a piecewise linear curve: knots, the drive at each knot, the slope before the first knot and after
+// each knot.
 const KNOT_PLACES: [Real; KNOTS] = [
     -120.9, -106.05, -90.75, -75.6, -60.75, -45.3, -30.3, -15.0, 0.0, 15.0, 30.15, 45.75, 61.05,
     76.65, 92.4, 107.7, 123.3,
@@ -53,7 +54,7 @@ const SLOPES: [Real; KNOTS + 1] = [
     0.990099, 0.96153843, 0.98039216, 0.96153843, 0.95238096, 0.98039216, 0.96153843, 0.95238096,
 ];
 
-// The drive's limits, what goes into the deadzones there, and the v between which no limit is met.
+// The limits of the drive, the corresponding inputs of the inverse deadzones, and the range of v in which no limit is reached.
 const LOWEST_DRIVE: Real = -120.0;
 const HIGHEST_DRIVE: Real = 120.0;
 const LOWEST: Real = -120.9;
@@ -61,19 +62,19 @@ const HIGHEST: Real = 123.3;
 const SAFE_BELOW: Real = -52.8758;
 const SAFE_ABOVE: Real = 53.9606;
 
-/// From a reference to the drive, and what has to be remembered between two samples.
+/// Computes the drive from a reference; contains the state between two samples.
 #[derive(Clone, Debug)]
 pub struct Compensator {
     plays: [Real; PLAYS],
     lags: [Real; LAGS],
-    /// What rounding has taken from the lags.
+    /// Rounding errors of the lags.
     carried: [Real; LAGS],
     drive: Real,
     out_of_reach: u32,
 }
 
 impl Compensator {
-    /// An actuator that was brought from zero to this reference in um long ago.
+    /// Returns the steady state after the actuator has moved from zero to this reference in um.
     pub fn standing_at(reference: Real) -> Self {
         let (lags, carried) = ([0.0; LAGS], [0.0; LAGS]);
         let mut own = Self { plays: [0.0; PLAYS], lags, carried, drive: 0.0, out_of_reach: 0 };
@@ -83,7 +84,8 @@ impl Compensator {
         own
     }
 
-    /// The drive in V for the next sample of the reference in um; one that is not finite holds the drive.
+    /// Returns the drive in V for the next sample of the reference in um. If the reference is not finite, the drive
+    /// does not change.
     #[inline]
     pub fn step(&mut self, reference: Real) -> Real {
         if !reference.is_finite() {
@@ -105,12 +107,12 @@ impl Compensator {
         self.drive
     }
 
-    /// Samples at which the drive stood at a limit.
+    /// Returns the number of samples with the drive at a limit.
     pub fn out_of_reach(&self) -> u32 {
         self.out_of_reach
     }
 
-    /// Moves the plays to v, or to what is within reach of it, and sets the drive.
+    /// Moves the plays to v, or to the nearest v that can be reached, and sets the drive.
     #[inline]
     fn go_to(&mut self, v: Real) -> Real {
         if !(SAFE_BELOW..=SAFE_ABOVE).contains(&v) {
@@ -144,7 +146,7 @@ fn clamp(value: Real, low: Real, high: Real) -> Real {
     if low > value { low } else { value }
 }
 
-/// The first play, without width, stands at the last v: where v rises, no play falls.
+/// The first play has no width and stores the last v. If v rises, no play moves down.
 #[inline]
 fn step_plays(places: &mut [Real; PLAYS], v: Real) -> Real {
     if v > places[0] {
@@ -173,7 +175,7 @@ fn drive_for(z: Real) -> Real {
     )
 }
 
-/// Four sums side by side do not wait for each other.
+/// Adds the terms in four independent sums, which the processor can compute in parallel.
 #[inline]
 fn sum(count: usize, mut term: impl FnMut(usize) -> Real) -> Real {
     let mut sums = [0.0; 4];
@@ -189,7 +191,7 @@ fn sum(count: usize, mut term: impl FnMut(usize) -> Real) -> Real {
     (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
-/// The v that takes the plays from where they stand to an output.
+/// Returns the v that moves the plays from their present state to an output.
 fn input_for(places: &[Real; PLAYS], output: Real) -> Real {
     let (mut v, mut reached, mut slope) = (places[0], 0.0, 0.0);
     for i in 0..PLAYS {

@@ -5,14 +5,14 @@ The model, in the order the signal flows::
     u -> z = sum_j g_j Z_eta_j[u] -> v = sum_i p_i F_r_i[z] -> y = G(q) v + offset
          deadzones (envelope)        plays (hysteresis)       linear dynamics
 
-u is (samples, inputs), y is (samples, outputs); only these two are measured.
+u has the shape (samples, inputs) and y has the shape (samples, outputs). Only these two signals are measured.
 
 >>> import gpi_hammerstein as gpi  # doctest: +SKIP
 >>> record = gpi.read_record("run.csv")  # doctest: +SKIP
 >>> model = gpi.identify(record)  # doctest: +SKIP
 >>> y = model.simulate(record.u[0])  # doctest: +SKIP
 
-`gpi_hammerstein.plot` draws stages and results; it is loaded when it is first used.
+`gpi_hammerstein.plot` draws records, models and results. It is loaded when it is first used.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -113,7 +113,7 @@ register()
 
 
 def __getattr__(name: str) -> Any:
-    """Load `plot`, and with it Matplotlib, `interop` and `datasets` when they are first used."""
+    """Load `plot` (and with it Matplotlib), `interop` and `datasets` when they are first used."""
     if name in ("plot", "interop", "datasets"):
         import importlib
 

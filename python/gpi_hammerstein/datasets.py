@@ -1,7 +1,8 @@
-"""Measured records that anybody may use, by their public address.
+"""Measured records that anybody may use, from their public addresses.
 
-The files stay where their authors keep them; each is known by its SHA-256. `GPI_DATA_DIR` names a folder that
-is looked into first, where there is no network: in it and in its folder `measured`, a folder a set.
+The files are downloaded from the addresses of their authors and checked by their SHA-256. If `GPI_DATA_DIR`
+names a folder, this folder and its subfolder `measured` are searched first, so that no network is needed.
+They contain one folder for each set.
 """
 
 import hashlib
@@ -25,15 +26,16 @@ class Dataset:
     Parameters
     ----------
     what
-        What was measured.
+        A description of the measurement.
     authors, licence, home
-        Who made it, how it may be used, where it is described.
+        The authors, the licence, and the web page that describes the set.
     address
-        Where its files are.
+        The address of its files.
     files
-        SHA-256 by path below `address`.
+        The SHA-256 of each file, by its path below `address`.
     parts
-        What `load` can return: the files of a part, and the function that makes a record of them.
+        The parts that `load` can return: the files of each part, and the function that makes a record of
+        them.
 
     Examples
     --------
@@ -51,13 +53,13 @@ class Dataset:
 
 
 def piezo(path: Path) -> Record:
-    """Read a table without header: drive in column 1, capacitive sensor in column 5."""
+    """Read a table without header. Column 1 is the drive, column 5 is the capacitive sensor."""
     table = np.loadtxt(path)
     return Record(table[:, 0], table[:, 4], 200.0, input_units=["V"], output_units=["um"])
 
 
 def mirror(u: Path, y: Path) -> Record:
-    """Read realisations of two periods, of which the first is warm-up."""
+    """Read realisations of two periods. The first period is warm-up."""
     record = read_record(u, output=str(y), rate=6400.0)
     return Record(
         record.u,
@@ -75,7 +77,7 @@ def throttle(path: Path) -> Record:
 
 
 def level(millivolts: int) -> tuple[tuple[str, ...], Callable[..., Record]]:
-    """Return the files of an amplitude and their reader."""
+    """Return the files of one amplitude, and the function that reads them."""
     return tuple(f"data/{name}_{millivolts}mV_train.npy" for name in "uy"), mirror
 
 
@@ -87,7 +89,7 @@ THROTTLES = ("Examples/Data/Throttle1.mat", "Examples/Data/Throttle3.mat")
 
 CATALOGUE: dict[str, Dataset] = {
     "piezo-p885-dbo": Dataset(
-        what="a piezo stack PI P-885.91 at 200 Hz: a sine of full scale, and one of varying amplitude",
+        what="a piezo stack PI P-885.91 at 200 Hz: a full-scale sine, and a sine of varying amplitude",
         authors="Yan Naing Aye",
         licence="MIT",
         home="https://github.com/yan9a/DiscreteBacklashOperator",
@@ -115,7 +117,7 @@ CATALOGUE: dict[str, Dataset] = {
         parts={f"{millivolts}mV": level(millivolts) for millivolts in (100, 200, 300)},
     ),
     "throttle-valve": Dataset(
-        what="an engine throttle with friction at its output, random steps at 100 Hz: no Hammerstein system",
+        what="an engine throttle with friction at the output, random steps at 100 Hz; no Hammerstein system",
         authors="Axel Dürrbaum, University of Kassel",
         licence="BSD-3-Clause",
         home="https://github.com/MRT-RT/TS_Toolbox",
@@ -130,26 +132,26 @@ CATALOGUE: dict[str, Dataset] = {
 
 
 def fetch(name: str, part: str | None = None) -> list[Path]:
-    """Return the files of a set, fetched unless they are here.
+    """Return the files of a set, and download those that are missing.
 
     Parameters
     ----------
     name
         A name of `CATALOGUE`.
     part
-        One of its parts, the first one when left out.
+        One of its parts; None takes the first one.
 
     Returns
     -------
     list of Path
-        The files, in the folder of `GPI_DATA_DIR` or in the user's cache.
+        The files, in the folder `GPI_DATA_DIR` or in the cache of the user.
 
     Raises
     ------
     ParameterError
-        A set or a part that there is not.
+        The set or the part does not exist.
     DataError
-        A file that cannot be fetched, or that is not what its SHA-256 says.
+        A file cannot be downloaded, or its SHA-256 is wrong.
 
     Examples
     --------
@@ -167,12 +169,12 @@ def load(name: str, part: str | None = None) -> Record:
     name
         A name of `CATALOGUE`.
     part
-        One of its parts, the first one when left out.
+        One of its parts; None takes the first one.
 
     Returns
     -------
     Record
-        With units, as the authors state them.
+        The record, with the units that the authors state.
 
     Raises
     ------
@@ -188,9 +190,9 @@ def load(name: str, part: str | None = None) -> Record:
 
 
 def chosen(name: str, part: str | None) -> tuple[Dataset, str]:
-    """Return the set and the name of its part."""
+    """Return the set and the name of the part."""
     if name not in CATALOGUE:
-        raise ParameterError(f"`name` = {name}: one of {', '.join(CATALOGUE)}")
+        raise ParameterError(f"`name` = {name}: must be one of {', '.join(CATALOGUE)}")
     dataset = CATALOGUE[name]
     part = part or next(iter(dataset.parts))
     if part not in dataset.parts:
@@ -199,19 +201,21 @@ def chosen(name: str, part: str | None) -> tuple[Dataset, str]:
 
 
 def here(name: str, path: str) -> Path | None:
-    """Return the file below `GPI_DATA_DIR`, if it is there and is the right one."""
+    """Return the file below `GPI_DATA_DIR`, or None. A file with a wrong SHA-256 is an error."""
     folder = os.environ.get("GPI_DATA_DIR")
     for place in (Path(folder) / "measured" / name, Path(folder) / name) if folder else ():
         file = place / Path(path).name
         if file.is_file():
             if hashlib.sha256(file.read_bytes()).hexdigest() == CATALOGUE[name].files[path]:
                 return file
-            raise DataError(f"{file}: not the file of the set {name}, its SHA-256 is another; remove it")
+            raise DataError(
+                f"{file}: not the file of the set {name}, because its SHA-256 is different; remove it"
+            )
     return None
 
 
 def fetched(dataset: Dataset, path: str) -> Path:
-    """Return the file in the user's cache, fetched if it is not there."""
+    """Return the file in the cache of the user, and download it if it is not there."""
     import pooch
 
     address = dataset.address + path
@@ -221,6 +225,6 @@ def fetched(dataset: Dataset, path: str) -> Path:
         )
     except Exception as error:
         raise DataError(
-            f"{address}: cannot be fetched ({type(error).__name__}: {error}); without a network put the file "
-            "into a folder of the set's name and let GPI_DATA_DIR name the folder above"
+            f"{address}: cannot be downloaded ({type(error).__name__}: {error}); without a network, put the "
+            "file into a folder with the name of the set, and set GPI_DATA_DIR to the parent of this folder"
         ) from None

@@ -1,4 +1,4 @@
-"""An estimator for scikit-learn, which is imported with this module and is no dependency."""
+"""An estimator for scikit-learn. scikit-learn is imported with this module and is not a dependency."""
 
 from typing import TYPE_CHECKING, Any, Self
 
@@ -9,9 +9,9 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from gpi_hammerstein._native import Model, Record, identify
 
 if TYPE_CHECKING:
-    # scikit-learn has no types of its own: what a user's type checker may know of its base classes.
+    # scikit-learn has no type hints: these are the parts of its base classes that a type checker needs.
     class BaseEstimator:
-        """What every estimator has."""
+        """The methods of every estimator."""
 
         def get_params(self, deep: bool = True) -> dict[str, Any]:
             """Return the parameters by name."""
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
             """Set parameters by name."""
 
         def __sklearn_tags__(self) -> Any:
-            """Return what scikit-learn should know of the estimator."""
+            """Return the properties of the estimator for scikit-learn."""
 
     class RegressorMixin:
-        """What every regressor has."""
+        """The methods of every regressor."""
 
         def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
             """Return the coefficient of determination."""
@@ -35,20 +35,21 @@ __all__ = ["GpiRegressor"]
 
 
 class GpiRegressor(RegressorMixin, BaseEstimator):
-    """Hysteresis before linear dynamics as a regressor of scikit-learn.
+    """A scikit-learn regressor: hysteresis before linear dynamics.
 
-    Rows are samples in the order of time at an even rate: what comes before a row matters, so that rows must
-    not be shuffled. Split with `sklearn.model_selection.TimeSeriesSplit`, not at random.
+    Rows are samples in the order of time at a constant rate. The output depends on earlier rows. Rows must
+    therefore not be shuffled. To split data, use `sklearn.model_selection.TimeSeriesSplit`, not a random
+    split.
 
     Parameters
     ----------
     rate
         Sampling rate in Hz.
     order, delay
-        As in :func:`gpi_hammerstein.identify`; chosen from the data when left out.
+        As in :func:`gpi_hammerstein.identify`; None chooses them from the data.
     half_widths, thresholds
-        How many plays and deadzones, or their half-widths and thresholds, shape (n,), in the unit of u, as in
-        :func:`gpi_hammerstein.identify`; chosen from the data when left out.
+        The numbers of plays and deadzones, or their half-widths and thresholds, shape (n,), in the unit of u,
+        as in :func:`gpi_hammerstein.identify`; None chooses them from the data.
 
     Attributes
     ----------
@@ -76,7 +77,7 @@ class GpiRegressor(RegressorMixin, BaseEstimator):
         thresholds: int | ArrayLike | None = None,
         delay: int | None = None,
     ) -> None:
-        """Keep the choices."""
+        """Store the parameters."""
         self.rate = rate
         self.order = order
         self.half_widths = half_widths
@@ -96,12 +97,12 @@ class GpiRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         GpiRegressor
-            Itself.
+            The fitted regressor itself.
 
         Raises
         ------
         DataError, ParameterError
-            As `identify`: too few samples, an input that does not move.
+            As in `identify`, for example for too few samples or a constant input.
         """
         usual: dict[str, Any] = {"multi_output": True, "y_numeric": True, "ensure_min_samples": 2}
         X, y = validate_data(self, X, y, dtype=np.float64, **usual)
@@ -115,7 +116,7 @@ class GpiRegressor(RegressorMixin, BaseEstimator):
         return self
 
     def predict(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Simulate the model from the first row on.
+        """Simulate the model, starting at the first row.
 
         Parameters
         ----------
@@ -133,7 +134,7 @@ class GpiRegressor(RegressorMixin, BaseEstimator):
         return outputs[:, 0] if outputs.shape[1] == 1 else outputs
 
     def __sklearn_tags__(self) -> Any:
-        """Tell scikit-learn that rows are in the order of time."""
+        """Return the tags, which state that rows are in the order of time."""
         tags = super().__sklearn_tags__()
         tags.regressor_tags.poor_score = True
         tags.target_tags.multi_output = True

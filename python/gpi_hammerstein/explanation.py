@@ -1,4 +1,4 @@
-"""An explanation as the JSON object `gpi-explanation/1`, and in words."""
+"""An explanation as the JSON object `gpi-explanation/1` and as text."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -8,9 +8,9 @@ import numpy as np
 from gpi_hammerstein._native import Explanation, effect_names
 from gpi_hammerstein.stage import stage, stage_in_words
 
-# Parameters of an effect that a sentence can hold.
+# Largest number of parameters of an effect in one sentence.
 SHOWN = 6
-# Wrong samples that a sentence can hold.
+# Largest number of wrong samples in one sentence.
 FEW = 4
 
 __all__ = ["failed_in_words", "in_words", "to_dict"]
@@ -22,13 +22,13 @@ def to_dict(found: Explanation) -> dict[str, Any]:
     Parameters
     ----------
     found
-        What `explain` returned.
+        The result of `explain`.
 
     Returns
     -------
     dict
         ``schema``, ``record``, ``noise_floor``, ``effects``, ``steps``, ``moved_resonance``, ``stage``,
-        ``rejected``, ``error`` (before and after, each train and holdout), ``residual`` (whether it is
+        ``rejected``, ``error`` (before and after, each for train and holdout), ``residual`` (whether it is
         structured, and its tests), ``verdict``, ``next_experiment``, ``wrong_samples``, ``interrupted``.
 
     Examples
@@ -76,21 +76,21 @@ def to_dict(found: Explanation) -> dict[str, Any]:
 
 
 def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True) -> Iterator[str]:
-    """Yield sentences that say what an explanation found.
+    """Yield the result of an explanation as sentences.
 
     Parameters
     ----------
     result
-        What `to_dict` returned.
+        The result of `to_dict`.
     unit
         The unit of the outputs.
     numbers
-        Whether sentences name the parameters of each effect and the figures of each test that fails.
+        Whether the sentences contain the parameters of each effect and the statistics of each failed test.
 
     Yields
     ------
     str
-        One sentence at a time: what was missing, how sure, what is left, what to measure next.
+        One item at a time: the missing effects, their uncertainty, the residual, the next experiment.
 
     Examples
     --------
@@ -101,23 +101,23 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
     before, after = (result["error"][when]["holdout"]["rms"] for when in ("before", "after"))
     names = effect_names()
     if result["interrupted"]:
-        yield "Stopped before the search had finished: this is what was found so far."
+        yield "The search was stopped before it was complete. This is the result so far."
     if not result["effects"]:
         if result["verdict"] == "explained":
-            yield "The model lacks nothing: what is left is noise."
+            yield "The model lacks no effect: the residual has no structure beyond noise."
         else:
-            yield "No effect of the catalogue explains what is left."
+            yield "No effect of the catalogue explains the residual."
     elif after >= before:
         yield (
-            f"The model lacked {join(result['effects'])}. On the held-out record the error goes from "
-            f"{before:.4g}{space} to {after:.4g}{space} rms: effects that the input does not drive are "
-            "others there and are left out."
+            f"The model lacked {join(result['effects'])}. On the held-out record the error changes from "
+            f"{before:.4g}{space} to {after:.4g}{space} rms. Effects that the input does not drive are "
+            "different in that record and are left out of its error."
         )
     else:
         yield (
-            f"The model lacked {join(result['effects'])}: on data that took no part in the fit the error "
-            f"falls from {before:.4g}{space} to {after:.4g}{space} rms "
-            f"({before / max(after, 1e-300):.3g} times)."
+            f"The model lacked {join(result['effects'])}. On held-out data, which were not used for the fit, "
+            f"the error decreases from {before:.4g}{space} to {after:.4g}{space} rms "
+            f"(by a factor of {before / max(after, 1e-300):.3g})."
         )
     shown: set[str] = set()
     for step in result["steps"] if numbers else []:
@@ -134,35 +134,38 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
     if result["moved_resonance"]:
         small, large = result["moved_resonance"]
         yield (
-            f"A resonance at {frequency(small)} where the outputs swing {small['swing']:.3g}{space} rms "
-            f"is at {frequency(large)} where they swing {large['swing']:.3g}{space}. Hysteresis, or "
-            "whatever else acts on the input alone, cannot move a resonance: it is ruled out as the only "
-            "cause."
+            "The frequency of a resonance depends on the amplitude of the outputs: it is "
+            f"{frequency(small)} at {small['swing']:.3g}{space} rms and {frequency(large)} at "
+            f"{large['swing']:.3g}{space} rms. An effect that acts only on the input, such as hysteresis, "
+            "cannot move a resonance. It is therefore not the only cause."
         )
     for other in result["rejected"]:
         if other["confounded_with"]:
-            yield f"{other['effect']} {other['why']}: this record cannot tell them apart."
+            yield f"{other['effect']} {other['why']}: this record cannot distinguish them."
     yield from stage_in_words(result["stage"])
     floor = result["noise_floor"]["rms"]
     left = result["error"]["after"]["train"]["rms"]
-    yield f"What is left is {left:.4g}{space} rms; the noise floor is {floor:.4g}{space}."
+    yield (
+        f"On the training data, the residual is {left:.4g}{space} rms; the noise floor is "
+        f"{floor:.4g}{space} rms."
+    )
     tests = result["residual"]["tests"]
     failed = list(dict.fromkeys(test["name"] for test in tests if not test["passed"]))
     if numbers:
         yield from failed_in_words(tests)
     elif failed:
-        yield f"It fails the test{'s' if len(failed) > 1 else ''} {join(failed)}."
+        yield f"The residual fails the test{'s' if len(failed) > 1 else ''} {join(failed)}."
     yield {
-        "explained": "Verdict: explained; the residual shows no more than noise.",
-        "partly-explained": "Verdict: partly explained; structure is left in the residual.",
-        "unattributed": "Verdict: unattributed; the residual has structure that no effect explains.",
+        "explained": "Verdict: explained. The residual has no structure beyond noise.",
+        "partly-explained": "Verdict: partly explained. The residual still has structure.",
+        "unattributed": "Verdict: unattributed. The residual has structure that no effect explains.",
     }[result["verdict"]]
     if result["next_experiment"]:
-        yield f"Next: {result['next_experiment']['why']}."
+        yield f"Next experiment: {result['next_experiment']['why']}."
 
 
 def wrong_in_words(wrong: Sequence[Mapping[str, Any]]) -> str:
-    """Return a sentence that says which samples were left out."""
+    """Return a sentence that lists the samples that are not scored."""
     several = wrong[-1]["experiment"] > 0
     where = [
         f"row {one['row']} of {one['output']}" + (f" in experiment {one['experiment']}" if several else "")
@@ -171,21 +174,21 @@ def wrong_in_words(wrong: Sequence[Mapping[str, Any]]) -> str:
     if len(wrong) > FEW:
         where.append(f"{len(wrong) - FEW} more")
     verb = (
-        "sample stands apart from its neighbours and is"
+        "sample differs strongly from its neighbours and is"
         if len(wrong) == 1
-        else "samples stand apart from their neighbours and are"
+        else "samples differ strongly from their neighbours and are"
     )
     return f"{len(wrong)} {verb} not scored: {join(where)} (counted from 0)."
 
 
 def failed_in_words(tests: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield a sentence for every test that fails, with its picture where there is one."""
+    """Yield a sentence for every failed test, with the name of its picture if there is one."""
     for test in tests:
         if not test["passed"]:
             picture = f" (see {test['picture']})" if test.get("picture") else ""
             yield (
                 f"The residual of {test['output']} fails the test {test['name']} "
-                f"({test['statistic']:.3g} over {test['threshold']:.3g}), which points to "
+                f"(statistic {test['statistic']:.3g}, threshold {test['threshold']:.3g}). This points to "
                 f"{test['points_to']}{picture}."
             )
 

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""Atomic writing of files, and model files."""
 
 import os
 import shutil
@@ -15,14 +15,14 @@ __all__ = ["load_model", "save_model", "staged", "write_atomically"]
 def write_atomically(path: str | os.PathLike[str], content: bytes | str) -> None:
     """Write a file under a temporary name in the same folder, then rename it.
 
-    A reader never sees half of it, and an interrupted write leaves the old file as it was.
+    A reader never sees an incomplete file. If the write is interrupted, the old file is unchanged.
 
     Parameters
     ----------
     path
-        Where the content goes; an existing file is replaced.
+        The file to write; an existing file is replaced.
     content
-        Bytes, or text that is encoded as UTF-8.
+        Bytes, or text, which is encoded as UTF-8.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def save_model(model: Model, path: str | os.PathLike[str]) -> None:
     model
         The model.
     path
-        The file, such as ``model.json``.
+        The file, for example ``model.json``.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def save_model(model: Model, path: str | os.PathLike[str]) -> None:
 
 
 def load_model(path: str | os.PathLike[str]) -> Model:
-    """Read a model that :meth:`Model.save` or ``gpi identify`` wrote.
+    """Read a model file that :meth:`Model.save` or ``gpi identify`` has written.
 
     Parameters
     ----------
@@ -85,12 +85,12 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     Returns
     -------
     Model
-        The model; its `identification` is not stored and hence None.
+        The model. Its `identification` is not stored in the file and is None.
 
     Raises
     ------
     DataError
-        The file is missing, is no model file, or is of a version that is not known.
+        The file is missing, is not a model file, or has an unknown version.
 
     Examples
     --------
@@ -99,9 +99,9 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     try:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); name a model file") from error
+        raise DataError(f"{path}: cannot be read ({error.strerror}); give a model file") from error
     except UnicodeDecodeError as error:
-        raise DataError(f"{path}: not a model file: not text; name a model.json") from error
+        raise DataError(f"{path}: not a model file, because it is not text; give a model.json") from error
     try:
         return Model.from_json(text)
     except DataError as error:
@@ -110,22 +110,22 @@ def load_model(path: str | os.PathLike[str]) -> Model:
 
 @contextmanager
 def staged(out: str | os.PathLike[str]) -> Iterator[Path]:
-    """Collect files in a temporary folder and move them to `out` when all are written.
+    """Collect files in a temporary folder, and move them to `out` when all of them are written.
 
     Parameters
     ----------
     out
-        The folder that receives the files; it is made when it does not exist.
+        The folder that receives the files. It is created if it does not exist.
 
     Yields
     ------
     Path
-        The temporary folder. An exception removes it and leaves `out` untouched.
+        The temporary folder. If an exception occurs, it is removed, and `out` is unchanged.
 
     Raises
     ------
     ParameterError
-        `out` is a file, or its place cannot be written.
+        `out` is a file, or its parent folder cannot be written.
 
     Examples
     --------
@@ -139,8 +139,8 @@ def staged(out: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(out).absolute()
     base = next(folder for folder in (target, *target.parents) if folder.exists())
     if not base.is_dir():
-        raise ParameterError(f"`out` = {out}: {base} is a file; name a folder")
-    # Beside the target, so that every move is a rename within one file system.
+        raise ParameterError(f"`out` = {out}: {base} is a file; give a folder")
+    # In the same parent folder, so that every move is a rename within one file system.
     beside = target.parent if target.parent.exists() else base
     try:
         folder = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=beside))

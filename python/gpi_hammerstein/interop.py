@@ -1,6 +1,6 @@
-"""To and from the packages that are used beside this one: python-control, SciPy, Polars, pandas, xarray.
+"""Conversions to and from other packages: python-control, SciPy, Polars, pandas, xarray.
 
-None of them but SciPy and Polars is a dependency; each is imported where it is needed.
+Only SciPy and Polars are dependencies of this package. The others are imported when they are needed.
 """
 
 from typing import Any
@@ -14,19 +14,19 @@ __all__ = ["from_control", "from_dlti", "to_control", "to_dlti", "to_pandas", "t
 
 
 def to_control(system: StateSpace, rate: float) -> Any:
-    """Return a linear part as a ``control.StateSpace``.
+    """Convert a linear system to a ``control.StateSpace``.
 
     Parameters
     ----------
     system
-        Such as ``model.linear``.
+        The linear system, for example ``model.linear``.
     rate
         Sampling rate in Hz.
 
     Returns
     -------
     control.StateSpace
-        Of the sampling time ``1 / rate``.
+        The same system, with the sampling time ``1 / rate``.
 
     Examples
     --------
@@ -39,7 +39,7 @@ def to_control(system: StateSpace, rate: float) -> Any:
 
 
 def from_control(system: Any) -> StateSpace:
-    """Return a linear system of python-control.
+    """Convert a linear system of python-control to a `StateSpace`.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def from_control(system: Any) -> StateSpace:
     Raises
     ------
     ParameterError
-        A continuous-time system.
+        The system is in continuous time.
 
     Examples
     --------
@@ -71,19 +71,19 @@ def from_control(system: Any) -> StateSpace:
 
 
 def to_dlti(system: StateSpace, rate: float) -> Any:
-    """Return a linear part as a ``scipy.signal.dlti``.
+    """Convert a linear system to a ``scipy.signal.dlti``.
 
     Parameters
     ----------
     system
-        Such as ``model.linear``.
+        The linear system, for example ``model.linear``.
     rate
         Sampling rate in Hz.
 
     Returns
     -------
     scipy.signal.dlti
-        In state space, of the sampling time ``1 / rate``.
+        The same system in state-space form, with the sampling time ``1 / rate``.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def to_dlti(system: StateSpace, rate: float) -> Any:
 
 
 def from_dlti(system: Any) -> StateSpace:
-    """Return a discrete-time linear system of SciPy.
+    """Convert a discrete-time linear system of SciPy to a `StateSpace`.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def from_dlti(system: Any) -> StateSpace:
     Raises
     ------
     ParameterError
-        A continuous-time system.
+        The system is in continuous time.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def from_dlti(system: Any) -> StateSpace:
 
 
 def columns(record: Record, experiment: int) -> dict[str, tuple[str, Any]]:
-    """Return unit and samples of every channel by its name, time first."""
+    """Return the unit and the samples of every channel by its name; the time comes first."""
     u, y = record.u[experiment], record.y[experiment]
     found: dict[str, tuple[str, Any]] = {"t": ("s", np.arange(len(u)) / record.rate)}
     groups = [
@@ -148,14 +148,14 @@ def headed(record: Record, experiment: int) -> dict[str, Any]:
 
 
 def to_polars(record: Record, experiment: int = 0) -> pl.DataFrame:
-    """Return an experiment as a Polars data frame.
+    """Convert an experiment to a Polars data frame.
 
     Parameters
     ----------
     record
-        What was measured.
+        The record.
     experiment
-        Which one, counted from 0.
+        The number of the experiment, counted from 0.
 
     Returns
     -------
@@ -172,14 +172,14 @@ def to_polars(record: Record, experiment: int = 0) -> pl.DataFrame:
 
 
 def to_pandas(record: Record, experiment: int = 0) -> Any:
-    """Return an experiment as a pandas data frame.
+    """Convert an experiment to a pandas data frame.
 
     Parameters
     ----------
     record
-        What was measured.
+        The record.
     experiment
-        Which one, counted from 0.
+        The number of the experiment, counted from 0.
 
     Returns
     -------
@@ -198,19 +198,19 @@ def to_pandas(record: Record, experiment: int = 0) -> Any:
 
 
 def to_xarray(record: Record, experiment: int = 0) -> Any:
-    """Return an experiment as an xarray dataset over ``t``.
+    """Convert an experiment to an xarray dataset over ``t``.
 
     Parameters
     ----------
     record
-        What was measured.
+        The record.
     experiment
-        Which one, counted from 0.
+        The number of the experiment, counted from 0.
 
     Returns
     -------
     xarray.Dataset
-        One variable a channel, its unit in ``attrs["units"]``.
+        One variable for each channel, with its unit in ``attrs["units"]``.
 
     Examples
     --------

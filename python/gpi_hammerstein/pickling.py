@@ -1,7 +1,7 @@
-"""Pickling and copying of what is made of numbers: operators, linear systems, records, models.
+"""Pickling and copying of operators, linear systems, records and models.
 
-A model goes as its file does: without its `identification` and `refinement`. Results of long work
-(explanations, identifications) are not pickled; save their model, or `to_dict()`.
+A pickled model contains the same as its file: it has no `identification` and no `refinement`. Explanations
+and identifications cannot be pickled. Save their model, or the result of `to_dict()`.
 """
 
 import copyreg
@@ -13,7 +13,7 @@ __all__ = ["register"]
 
 
 def register() -> None:
-    """Tell `pickle` and `copy` how to make these objects anew.
+    """Register the functions with which `pickle` and `copy` rebuild these objects.
 
     Examples
     --------
@@ -30,12 +30,12 @@ def register() -> None:
 
 
 def model_from(text: str) -> Model:
-    """Return the model of a JSON text."""
+    """Return the model from a JSON text."""
     return Model.from_json(text)
 
 
 def parts(record: Record) -> dict[str, Any]:
-    """Return what a record is made of."""
+    """Return the parts of a record, as arguments of its constructor."""
     channels = [f"{kind}_{what}" for kind in ("input", "output", "covariate") for what in ("names", "units")]
     own = {name: getattr(record, name) for name in ("u", "y", "rate", "covariates", "warmup", *channels)}
     if not record.covariate_names:
@@ -44,5 +44,5 @@ def parts(record: Record) -> dict[str, Any]:
 
 
 def record_from(own: dict[str, Any]) -> Record:
-    """Return the record that is made of these parts."""
+    """Return the record from its parts."""
     return Record(**own)

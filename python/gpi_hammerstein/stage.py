@@ -1,4 +1,4 @@
-"""What an engineer asks of a stage first: sensitivity, width of the loop, first resonance."""
+"""The main properties of a stage: sensitivity, width of the hysteresis loop, first resonance."""
 
 from typing import Any
 
@@ -6,34 +6,34 @@ import numpy as np
 
 from gpi_hammerstein._native import Model, Record
 
-# Samples of each branch of the loop.
+# Number of samples of each branch of the loop.
 BRANCH = 500
-# Pairs of input and output that sentences can hold.
+# Largest number of pairs of input and output that are described by sentences.
 FEW = 2
-# A pair of poles that is damped more shows no peak.
+# Damping ratio above which a pair of poles shows no peak in the frequency response.
 DAMPED = 0.7
 
 
 def stage(model: Model, record: Record) -> dict[str, Any]:
-    """Return what a model says of the stage, in the range of a record's inputs.
+    """Return the main properties of a stage, for the range of a record's inputs.
 
-    The loop is that of slow motion from end to end of each input's range, through hysteresis and the gain of
-    the linear part at rest, ``G(1) v``; effects such as creep come on top of it.
+    The loop is that of slow motion over the range of each input. It contains the hysteresis and the DC gain
+    of the linear part, ``G(1) v``. It does not contain effects such as creep.
 
     Parameters
     ----------
     model
         A model of the stage.
     record
-        The record whose inputs give the range.
+        The record that defines the range of the inputs.
 
     Returns
     -------
     dict
-        ``loops``, rows of ``input``, ``output``, ``range``, ``sensitivity`` (output over input from end to
-        end, in ``unit``) and ``width`` (the loop's largest opening over the output's travel);
-        ``first_resonance`` with ``frequency_hz`` and ``damping``, None where no pair of poles is damped less
-        than 0.7.
+        ``loops``, a list of ``input``, ``output``, ``range``, ``sensitivity`` (change of the output over
+        change of the input, over the whole range, in ``unit``) and ``width`` (the largest opening of the loop
+        over the travel of the output); ``first_resonance`` with ``frequency_hz`` and ``damping``, or None if
+        no pair of poles has a damping ratio below 0.7.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def stage(model: Model, record: Record) -> dict[str, Any]:
         low = min(float(u[:, i].min()) for u in record.u)
         high = max(float(u[:, i].max()) for u in record.u)
         rise, fall = np.linspace(low, high, BRANCH), np.linspace(high, low, BRANCH)
-        # the first way up and down forgets what was before
+        # the first cycle removes the influence of the initial state
         v = model.hysteresis[i](np.concatenate([rise, fall, rise, fall]))
         up, down = v[2 * BRANCH : 3 * BRANCH], v[3 * BRANCH :][::-1]
         travel = float(up[-1] - up[0])
@@ -67,7 +67,7 @@ def stage(model: Model, record: Record) -> dict[str, Any]:
 
 
 def first_resonance(model: Model) -> dict[str, float] | None:
-    """Return the lowest frequency of a pair of poles that shows as a peak, and its damping."""
+    """Return the lowest natural frequency of a pair of poles that shows a peak, and its damping ratio."""
     found = []
     for pole in model.linear.poles:
         if pole.imag > 0:
@@ -78,13 +78,13 @@ def first_resonance(model: Model) -> dict[str, float] | None:
 
 
 def natural(pole: complex, rate: float) -> tuple[float, float]:
-    """Return natural frequency in Hz and damping ratio of a pole at a sampling rate in Hz."""
+    """Return the natural frequency in Hz and the damping ratio of a pole, for a sampling rate in Hz."""
     continuous = np.log(complex(pole)) * rate
     return float(abs(continuous)) / (2 * np.pi), float(-continuous.real / abs(continuous))
 
 
 def stage_in_words(found: dict[str, Any]) -> list[str]:
-    """Return the same in words: a sentence a pair of channels, where they are few, and the resonance."""
+    """Return the properties as sentences: the pairs of channels, unless there are many, and the resonance."""
     loops = found["loops"] if len(found["loops"]) <= FEW else []
     sentences = []
     for one in loops:
@@ -92,8 +92,8 @@ def stage_in_words(found: dict[str, Any]) -> list[str]:
         low, high = (f"{end:.4g}" for end in one["range"])
         ends = f"between {low} and {high} {one['unit'].partition('/')[2]}".rstrip()
         sentences.append(
-            f"From {one['input']} to {one['output']} in slow motion: {gain} {ends}, a hysteresis loop "
-            f"{100 * one['width']:.2g} % of the travel wide."
+            f"For slow motion, the sensitivity from {one['input']} to {one['output']} is {gain} {ends}. "
+            f"The width of the hysteresis loop is {100 * one['width']:.2g} % of the travel."
         )
     resonance = found["first_resonance"]
     if resonance:

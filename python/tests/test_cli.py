@@ -384,4 +384,4 @@ def test_help_ends_with_an_example_of_options_that_there_are(command, example, c
 
 def test_without_words_it_says_how_to_begin(capsys):
     run([])
-    assert "To begin: `gpi demo`" in capsys.readouterr().out
+    assert "To start, run `gpi demo`" in capsys.readouterr().out

@@ -168,7 +168,7 @@ def test_the_command_speaks(saved, tmp_path, capsys):
         cli.run(["compensate", saved, str(path), "-r", "wanted", "--limits", "-0.5,0.5", "--slew", "5"]) == 0
     )
     said = capsys.readouterr().out
-    assert "Predicted error" in said and "stand at a limit" in said and "fastest drive" in said
+    assert "Predicted error" in said and "are at a limit" in said and "slope of the drive is limited" in said
     assert cli.run(["compensate", saved, str(path), "-r", "wanted", "--limits", "5"]) == 2
     assert "such as -10,150" in capsys.readouterr().err
     other = write(tmp_path / "slow.csv", rate=500.0)

@@ -43,12 +43,12 @@ def test_a_file_that_is_here_is_taken(own):
 def test_another_file_is_refused(own):
     own.mkdir(parents=True)
     (own / "own.dat").write_bytes(TEXT + b" ")
-    with pytest.raises(gpi.DataError, match="its SHA-256 is another"):
+    with pytest.raises(gpi.DataError, match="its SHA-256 is different"):
         datasets.load("own")
 
 
 def test_without_a_network_it_says_what_to_do(own):
-    with pytest.raises(gpi.DataError, match="cannot be fetched.*GPI_DATA_DIR"):
+    with pytest.raises(gpi.DataError, match="cannot be downloaded.*GPI_DATA_DIR"):
         datasets.load("own")
 
 
@@ -76,7 +76,7 @@ def test_what_is_fetched_is_checked_and_kept(own, monkeypatch, sent):
             assert datasets.load("own").samples == datasets.load("own").samples == 300
             assert asked == ["/folder/own.dat"]
         else:
-            with pytest.raises(gpi.DataError, match="cannot be fetched"):
+            with pytest.raises(gpi.DataError, match="cannot be downloaded"):
                 datasets.load("own")
     finally:
         server.shutdown()
@@ -85,7 +85,7 @@ def test_what_is_fetched_is_checked_and_kept(own, monkeypatch, sent):
 
 
 def test_unknown_names_are_told():
-    with pytest.raises(gpi.ParameterError, match="`name` = other: one of piezo-p885-dbo"):
+    with pytest.raises(gpi.ParameterError, match="`name` = other: must be one of piezo-p885-dbo"):
         datasets.load("other")
     with pytest.raises(gpi.ParameterError, match="`part` = 9: throttle-valve has 1, 3"):
         datasets.load("throttle-valve", "9")

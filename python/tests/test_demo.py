@@ -65,7 +65,13 @@ def test_the_demonstration_writes_model_json_and_pictures(shown: Demonstration) 
 
 def test_the_demonstration_tells_its_story(shown: Demonstration) -> None:
     told = shown.told
-    steps = ["1 Identify", "2 What is left", "3 What is missing", "4 Before and after", "had put in"]
+    steps = [
+        "1 Identification",
+        "2 Residual",
+        "3 Missing effects",
+        "4 Before and after",
+        "simulator contains",
+    ]
     places = [told.index(step) for step in steps]
     assert places == sorted(places)
     for words in ("creep", "periodic-disturbance", "Verdict: explained", "before, held out"):

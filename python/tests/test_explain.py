@@ -161,7 +161,9 @@ def test_wrong_samples_are_told_however_few():
     assert [row["row"] for row in found.wrong_samples] == [5000, 7200]
     assert found.wrong_samples[0] | {"row": 0} == {"experiment": 0, "output": "y", "row": 0}
     words = " ".join(in_words(found.to_dict()))
-    assert "2 samples stand apart from their neighbours" in words and "row 5000 of y and row 7200" in words
+    assert (
+        "2 samples differ strongly from their neighbours" in words and "row 5000 of y and row 7200" in words
+    )
 
 
 def bouc_wen(u, rate):

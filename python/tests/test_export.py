@@ -130,7 +130,9 @@ def test_the_command_writes_both_with_facts(tmp_path, capsys):
     files = ["--rust", str(tmp_path / "own.rs"), "--c", str(tmp_path / "c")]
     assert cli.run(["export", str(model), *files, "--limits=-1.5,1.2"]) == 0
     said = capsys.readouterr().out
-    assert "Undone: hysteresis, creep." in said and "left dynamics" in said and "own.rs" in said
+    assert (
+        "Compensated: hysteresis, creep." in said and "not compensated dynamics" in said and "own.rs" in said
+    )
     digest = hashlib.sha256(model.read_bytes()).hexdigest()
     for file in (tmp_path / "own.rs", tmp_path / "c" / "gpi_compensator.h"):
         text = file.read_text()

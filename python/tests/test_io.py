@@ -144,7 +144,7 @@ def test_several_npy_pairs_are_one_record(tmp_path: Path) -> None:
         gpi.read_record(inputs, output="y_low.npy", rate=10.0)
     with pytest.raises(gpi.DataError, match=r"y_mid.npy: no such file"):
         gpi.read_record(inputs, output=["y_low.npy", "y_mid.npy"], rate=10.0)
-    with pytest.raises(gpi.ParameterError, match=r"r.csv beside .npy files"):
+    with pytest.raises(gpi.ParameterError, match=r"r.csv together with .npy files"):
         gpi.read_record([*inputs, tmp_path / "r.csv"], rate=10.0)
 
 
@@ -233,7 +233,7 @@ def test_names_are_found_below_what_a_recorder_writes_above_them(tmp_path: Path)
     assert record.input_units == ["V"] and record.output_units == ["um"]
     assert record.rate == pytest.approx(1 / (T[1] - T[0]))
     np.testing.assert_allclose(record.u[0][:, 0], U)
-    assert recording.notes == ["2 lines above the names are left out, first `Model,MSO-5204`"]
+    assert recording.notes == ["skipped 2 lines above the names, first `Model,MSO-5204`"]
 
     path.write_text(f"t_ms,u_V,y_um\n{rows}")
     assert read_recording(path).notes == []
@@ -260,7 +260,7 @@ def test_names_that_are_not_there_are_refused(tmp_path: Path) -> None:
     refuse(path, "no input column", "a, b, c")
     refuse(path, "no column `volt`", "a, b, c", input="volt")
     refuse(path, "no time column", "--rate", input="b", output="c")
-    refuse(path, "`b`", "two parts", input="b", output="b", rate=1.0)
+    refuse(path, "`b`", "two roles", input="b", output="b", rate=1.0)
     (tmp_path / "n.csv").write_text("0,1,2\n1,2,3\n")
     refuse(tmp_path / "n.csv", "no header")
     (tmp_path / "d.csv").write_text("t,u,u,y\n0,1,2,3\n1,2,3,4\n")

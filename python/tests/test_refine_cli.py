@@ -195,4 +195,4 @@ def test_what_the_data_leave_open_is_a_warning_each(result: dict[str, Any]) -> N
         "warning the data do not determine u.weights[1], offset[0].y, section[0].a1 and 1 more together",
         "warning the data do not determine u.weights[2]",
     ]
-    assert any("took all its steps" in line for line in lines)
+    assert any("reached the maximum number of steps" in line for line in lines)

@@ -80,7 +80,7 @@ def test_the_page_says_what_was_found(found, page):
     assert found.effects == ["periodic-disturbance"] and found.verdict == "explained"
     for said in (
         "The model lacked periodic-disturbance",
-        "Explained: what is left is noise.",
+        "Explained: the residual has no structure beyond noise.",
         f"{found.before['holdout']['rms']:.4g}",
         f"{found.after['holdout']['rms']:.4g}",
         f"{found.steps[1]['parameters'][0]['value']:.5g}",
@@ -200,9 +200,9 @@ def test_the_record_speaks_of_itself():
     assert said["samples"] == "1000 (1 s)" and said["not scored, at the start"] == "10 samples"
     assert "-0.8 to 0.8 V, steps of 0.1 V" in said["u"]
     assert "% of the samples at the lowest value" in said["u"] and "highest" in said["u"]
-    assert "below 5 Hz" in said["u excites"]
+    assert "below 5 Hz" in said["excitation by u"]
     still = dict(facts(gpi.Record(np.ones(50), np.sin(k[:50]), 1000.0)))
-    assert still["u excites"] == "nothing: it does not move"
+    assert still["excitation by u"] == "none: the input is constant"
 
 
 def test_notebooks_show_tables(found):

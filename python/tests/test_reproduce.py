@@ -88,7 +88,7 @@ def test_files_are_fetched_once_and_checked(tmp_path: Path) -> None:
     assert fetch(address, {"u.npy": digest}, folder)[0].read_bytes() == b"measured"
     with pytest.raises(gpi.DataError, match="u.npy: not the published file"):
         fetch(address, {"u.npy": "0" * 64}, folder)
-    with pytest.raises(gpi.DataError, match=r"cannot be fetched .* put y.npy into .*kept yourself"):
+    with pytest.raises(gpi.DataError, match=r"cannot be downloaded .* put y.npy into .*kept manually"):
         fetch(address, {"y.npy": digest}, folder)
 
 

@@ -61,22 +61,30 @@ def test_power_is_the_share_found_right_and_false_per_strength() -> None:
         result("creep drift", "creep", strength=2.0),
     ]
     table = score_tables.power(results)
-    assert table.heads == ("effect", "0.5", "2")
+    assert table.heads == ("effect", "runs", "0.5", "2")
     assert list(table.rows) == [
-        ("creep", "0 / 0 / 50", "100 / 50 / 50"),
-        ("drift", "-", "100 / 100 / 0"),
-        ("all", "0 / 0 / 50", "100 / 67 / 33"),
+        ("creep", "4", "0 / 0 / 50", "100 / 50 / 50"),
+        ("drift", "1", "-", "100 / 100 / 0"),
+        ("all", "5", "0 / 0 / 50", "100 / 67 / 33"),
     ]
 
 
 def test_single_effects_and_the_summary() -> None:
-    results = [result("creep", "creep", after=1.5), result("creep", "drift"), result("", "")]
+    results = [
+        result("creep", "creep", after=1.5),
+        result("creep", "drift"),
+        result("", ""),
+        result("", "creep", is_outside=True),
+    ]
     assert list(score_tables.singles(results).rows) == [
         ("creep", "1 of 2", "1 x drift"),
         ("none", "1 of 1", ""),
+        ("outside the catalogue", "0 of 1", "1 x creep"),
     ]
     figures = {row[0]: row[1] for row in score_tables.summary(results).rows}
-    assert figures["right"] == "2 of 3"
+    assert figures["right"] == "2 of 4"
+    assert figures["false alarms on stages that lack nothing"] == "0 of 1"
+    assert figures["false alarms on stages that have an effect outside the catalogue"] == "1 of 1"
     assert figures["held-out error over the noise, where right"] == "median 1.250, worst 1.500"
 
 

@@ -30,8 +30,8 @@ app: typer.Typer = typer.Typer(
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     help="Identify piezo and other smart-material actuators from measured data.\n\n"
-    "To begin: `gpi demo`, then `gpi report` with a record of your own.",
-    epilog="Exit codes: 0 done, 2 the call is wrong, 3 the data are unusable, 1 anything else.",
+    "To start, run `gpi demo`. Then run `gpi report` with a record of your own.",
+    epilog="Exit codes: 0 success, 2 wrong call, 3 unusable data, 130 interrupted, 1 any other error.",
 )
 
 
@@ -68,17 +68,17 @@ app.add_typer(reproduce, name="reproduce")
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code.
+    """Run the command `gpi` and return its exit code.
 
     Parameters
     ----------
     arguments
-        The words after ``gpi``; None takes those of the process.
+        The arguments after ``gpi``; None takes those of the process.
 
     Returns
     -------
     int
-        0 done, 2 the call is wrong, 3 the data are unusable, 1 anything else, 130 interrupted.
+        0 success, 2 wrong call, 3 unusable data, 130 interrupted, 1 any other error.
 
     Examples
     --------
@@ -96,24 +96,24 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         return complain("interrupted; nothing was written", INTERRUPTED)
     except BrokenPipeError:
-        # The reader of a pipe has gone: let the interpreter's last flush go nowhere.
+        # The reader of the pipe was closed: redirect the interpreter's last flush to nowhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except Exception as error:
         if os.environ.get("GPI_DEBUG"):
             raise
-        # Typer carries its own copy of Click's exceptions: they are known by what they can do.
+        # Typer has its own copy of Click's exceptions, which are recognised by their method `show`.
         if callable(show := getattr(error, "show", None)):
             show()
             return int(getattr(error, "exit_code", WRONG_CALL))
         return complain(error, FAILED)
     except BaseException as error:
-        # A panic of the native module is a BaseException; it has printed where it happened.
+        # A panic of the native module is a BaseException, and has already printed its location.
         if type(error).__name__ != "PanicException":
             raise
         return complain(f"a bug in the native module: {error}", FAILED)
 
 
 def main() -> None:
-    """Run the command and leave with its exit code."""
+    """Run the command `gpi` and exit with its exit code."""
     sys.exit(run())

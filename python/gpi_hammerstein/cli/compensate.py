@@ -1,4 +1,4 @@
-"""`gpi compensate`: the drive that makes an actuator follow a reference."""
+"""`gpi compensate`: compute the drive that makes an actuator follow a reference."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,14 +25,14 @@ from gpi_hammerstein.io import Recording, read_recording
 
 ReferenceFile = Annotated[
     Path,
-    typer.Argument(metavar="REFERENCE", help="A table of what the outputs shall do.", show_default=False),
+    typer.Argument(metavar="REFERENCE", help="A table with the desired outputs.", show_default=False),
 ]
 Columns = Annotated[
     list[str] | None,
     typer.Option(
         "--reference",
         "-r",
-        help="Columns of the reference; the model's output names, `reference`, `r` and `y` are found.",
+        help="Columns of the reference. The model's output names, `reference`, `r` and `y` are recognised.",
         rich_help_panel=options.COLUMNS,
     ),
 ]
@@ -41,21 +41,21 @@ Limits = Annotated[
     typer.Option(
         "--limits",
         metavar="LOW,HIGH",
-        help="Lowest and highest drive, in the input's unit; once for all inputs, or once each.",
+        help="Lowest and highest drive, in the unit of the input; once for all inputs, or once for each.",
     ),
 ]
-Slew = Annotated[float | None, typer.Option(help="The fastest drive, in units of the input per second.")]
-QuasiStatic = Annotated[
-    bool, typer.Option("--quasi-static", help="Leave the dynamics alone: only their DC gain is inverted.")
+Slew = Annotated[
+    float | None, typer.Option(help="Largest slope of the drive, in units of the input per second.")
 ]
+QuasiStatic = Annotated[bool, typer.Option("--quasi-static", help="Invert only the DC gain of the dynamics.")]
 Preview = Annotated[
     float | None,
     typer.Option(
         metavar="SECONDS",
-        help="How much earlier the drive may begin; as long as the dynamics need by itself.",
+        help="Time by which the drive may begin before the reference. Default: as long as the dynamics need.",
     ),
 ]
-Passes = Annotated[int, typer.Option(min=0, help="Most passes after the first one.")]
+Passes = Annotated[int, typer.Option(min=0, help="Largest number of iterations after the first pass.")]
 
 WRITTEN = ["drive.csv", "compensation.json", "compensation.png"]
 
@@ -75,16 +75,19 @@ def compensate(
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
-    """Find the drive that makes the outputs follow a reference, and predict the error.
+    """Compute the drive that makes the outputs follow a reference, and predict the error.
 
-    The model is run backwards: sensor, dynamics, hysteresis, delay. Writes drive.csv (t, the inputs, the
-    reference and what the model predicts), compensation.json and a picture to DIR.
+    The model is inverted from the output to the input: sensor curve, dynamics, hysteresis, delay. Writes
+    drive.csv (t, the inputs, the reference and the predicted outputs), compensation.json and a picture to
+    DIR.
     """
     model = files.load_model(model_file)
     recording = read_reference(reference_file, model, options.split_names(reference), time, rate, resample)
     if len(recording.runs) > 1:
         count = len(recording.runs)
-        raise DataError(f"{reference_file}: the reference falls into {count} parts; give one without gaps")
+        raise DataError(
+            f"{reference_file}: the reference has gaps and consists of {count} parts; give one without gaps"
+        )
     with working("compensating"):
         found = model.compensate(
             recording.runs[0].u,
@@ -130,22 +133,24 @@ def compensate(
         return
     screen = console()
     unit = model.output_units[0] if len(set(model.output_units)) == 1 else ""
-    rows = {"drive in proportion": found.error_in_proportion, "compensated": found.error}
-    screen.print(error_table(rows, unit, "Predicted error; that of the model itself comes on top"))
+    rows = {"proportional drive": found.error_in_proportion, "compensated": found.error}
+    screen.print(error_table(rows, unit, "Predicted error, without the error of the model itself"))
     for name, row in result["drive"].items():
         screen.print(
-            f"{name} goes from {row['lowest']:.4g} to {row['highest']:.4g} {row['unit']}, at most "
-            f"{row['fastest']:.4g} {row['unit']}/s"
-            + ("." if limits else "; no limits were given (--limits).")
+            f"The range of {name} is {row['lowest']:.4g} to {row['highest']:.4g} {row['unit']}, and its "
+            f"largest slope is {row['fastest']:.4g} {row['unit']}/s."
+            + ("" if limits else " No limits were given (--limits).")
         )
     for effect, why in found.left:
-        screen.print(f"[yellow]left[/] {effect}: {escape(why)}; its error comes on top.")
+        screen.print(
+            f"[yellow]not compensated[/] {effect}: {escape(why)}. The predicted error does not contain it."
+        )
     if found.lead:
         screen.print(f"The drive begins {found.lead / model.rate:.4g} s before the reference.")
     if found.out_of_reach:
-        screen.print(f"[yellow]out of reach[/] {found.out_of_reach} samples stand at a limit of the drive.")
+        screen.print(f"[yellow]out of reach[/] {found.out_of_reach} samples are at a limit of the drive.")
     if found.too_fast:
-        screen.print(f"[yellow]too fast[/] {found.too_fast} samples are held back to the fastest drive.")
+        screen.print(f"[yellow]too fast[/] the slope of the drive is limited at {found.too_fast} samples.")
     say_written(screen, out, WRITTEN)
 
 
@@ -157,7 +162,7 @@ def read_reference(
     rate: float | None,
     resample: str | None,
 ) -> Recording:
-    """Read the columns of a reference, found by their usual names unless given."""
+    """Read the columns of a reference. They are recognised by their usual names unless they are given."""
     usual = [list(model.output_names), ["reference"], ["ref"], ["r"], ["y"]]
     missing: DataError | None = None
     for wanted in usual if names is None else [names]:
@@ -181,7 +186,7 @@ def read_reference(
 
 
 def matching(recording: Recording, model: Model) -> Recording:
-    """Refuse a reference that the model was not made for."""
+    """Reject a reference that does not match the model."""
     wanted, found = len(model.output_names), len(recording.inputs)
     if wanted != found:
         raise DataError(f"the model has {wanted} outputs, but the reference has {found} columns")
@@ -199,28 +204,28 @@ def matching(recording: Recording, model: Model) -> Recording:
 
 
 def read_pair(text: str) -> tuple[float, float]:
-    """Read two numbers joined by a comma."""
+    """Parse two numbers that are separated by a comma."""
     try:
         low, high = (float(part) for part in text.split(","))
     except ValueError:
         raise ParameterError(
-            f"`limits` = {text}: write the lowest and the highest drive, such as -10,150"
+            f"`limits` = {text}: must be the lowest and the highest drive, such as -10,150"
         ) from None
     return low, high
 
 
 def columns(signal: np.ndarray) -> np.ndarray:
-    """Return the channels of a signal, one a row."""
+    """Return the channels of a signal, one in each row."""
     return np.atleast_2d(signal.T)
 
 
 def fastest(u: np.ndarray, rate: float) -> float:
-    """Return the largest speed, in units per second."""
+    """Return the largest slope, in units per second."""
     return float(np.max(np.abs(np.diff(u)), initial=0.0) * rate)
 
 
 def drive_table(model: Model, found: Compensation) -> pl.DataFrame:
-    """Return time, drives, references and predictions, one a column."""
+    """Return a table with columns for the time, the drives, the references and the predictions."""
     table = {"t": found.time}
     for name, values in zip(model.input_names, columns(found.drive), strict=True):
         table[name] = values

@@ -1,4 +1,4 @@
-"""`gpi datasets`: measured records that anybody may use."""
+"""`gpi datasets`: list and download measured records that anybody may use."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,18 +11,20 @@ from gpi_hammerstein import files
 from gpi_hammerstein.cli.output import console, print_json, working
 
 datasets: typer.Typer = typer.Typer(
-    no_args_is_help=True, help="Fetch measured records by their public address."
+    no_args_is_help=True, help="List and download measured records that anybody may use."
 )
 
-Name = Annotated[str, typer.Argument(help="A set; `gpi datasets list` names them.", show_default=False)]
-Part = Annotated[str | None, typer.Option(help="One of its parts; the first one unless given.")]
-Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Where the records go.")]
+Name = Annotated[
+    str, typer.Argument(help="Name of a set; `gpi datasets list` lists them.", show_default=False)
+]
+Part = Annotated[str | None, typer.Option(help="One of its parts. Default: the first one.")]
+Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the records.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 @datasets.command("list", epilog="Example: gpi datasets list")
 def list_all(as_json: Json = False) -> None:
-    """List the sets with their parts, licences and homes."""
+    """List the sets with their parts, licences and web pages."""
     from gpi_hammerstein.datasets import CATALOGUE
 
     if as_json:
@@ -50,12 +52,12 @@ def list_all(as_json: Json = False) -> None:
 
 @datasets.command(epilog="Example: gpi datasets fetch piezo-p885-dbo -o data")
 def fetch(name: Name, part: Part = None, out: Out = Path(".")) -> None:
-    """Fetch a part of a set, and write it as CSV files that every command reads, one an experiment."""
+    """Download a part of a set, and write a CSV file for each experiment. All commands read these files."""
     from gpi_hammerstein.datasets import chosen, load
     from gpi_hammerstein.interop import to_polars
 
     dataset, own = chosen(name, part)
-    with working(f"fetching {name}"):
+    with working(f"downloading {name}"):
         record = load(name, own)
     count = len(record.u)
     names = [f"{name}-{own}.csv"] if count == 1 else [f"{name}-{own}-{i}.csv" for i in range(count)]
@@ -65,5 +67,6 @@ def fetch(name: Name, part: Part = None, out: Out = Path(".")) -> None:
     screen = console()
     screen.print(f"{escape(dataset.what)}. By {escape(dataset.authors)}, {dataset.licence}: {dataset.home}")
     if any(record.warmup):
-        screen.print(f"The first {max(record.warmup)} samples of each are a run-in: read them with --warmup.")
+        warmup = max(record.warmup)
+        screen.print(f"The first {warmup} samples of each file are warm-up: use --warmup {warmup}.")
     screen.print("Written: " + ", ".join(escape(str(out / file)) for file in names))

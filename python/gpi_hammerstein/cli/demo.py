@@ -1,4 +1,4 @@
-"""`gpi demo`: the whole of it on a record that comes along."""
+"""`gpi demo`: the complete workflow on the demo record."""
 
 import json
 from importlib.resources import as_file, files
@@ -24,10 +24,10 @@ RECORD, TRUTH = "demo.csv.gz", "demo.truth.json"
 
 
 def demo(out: options.Out = None, as_json: options.Json = False) -> None:
-    """Identify the record that comes along, find what the model lacks, and compare before and after.
+    """Run the complete workflow on a bundled record: identify, find missing effects, compare the errors.
 
-    The record is a simulated piezo stage with effects that the model is not told of. Writes model.json,
-    demo.json and pictures to DIR.
+    The record is from a simulated piezo stage with effects that the declared model does not contain. Writes
+    model.json, demo.json and pictures to DIR.
     """
     with as_file(DATA / RECORD) as path:
         record = read_record(path)
@@ -51,36 +51,36 @@ def demo(out: options.Out = None, as_json: options.Json = False) -> None:
 
 
 def tell(screen: Console, found: Explanation, result: dict[str, Any], out: Path | None) -> None:
-    """Print the story: what is identified, what is left, what is missing, before and after."""
+    """Print the identified model, the residual, the missing effects, and the errors before and after."""
     record, explanation, truth = found.record, result["explanation"], result["truth"]
     unit = record.output_units[0]
     before, after = (explanation["error"][when]["holdout"] for when in ("before", "after"))
     screen.print(
         escape(f"A simulated piezo stage, {record.input_units[0]} to {unit}: {record.samples} samples ")
-        + f"at {record.rate:g} Hz. What else its simulator put in, no model was told.\n"
+        + f"at {record.rate:g} Hz. It has effects that the declared model does not contain.\n"
     )
     plays, zones = (len(result["identified"][name][0]) for name in ("half_widths", "thresholds"))
     screen.print(
-        f"[bold]1 Identify[/]  {zones} deadzones and {plays} plays before linear dynamics of order "
-        f"{result['identified']['order']}: on held-out data {before['rms']:.3g} {escape(unit)} rms, "
-        f"{100 * before['nrmse']:.2g} % of the span."
+        f"[bold]1 Identification[/]  The model has {zones} deadzones and {plays} plays before linear "
+        f"dynamics of order {result['identified']['order']}. Its error on held-out data is "
+        f"{before['rms']:.3g} {escape(unit)} rms, {100 * before['nrmse']:.2g} % of the span."
     )
-    chance = 1.96 / np.sqrt(record.samples)
+    bound = 1.96 / np.sqrt(record.samples)
     screen.print(
-        f"[bold]2 What is left[/]  is no noise: neighbouring samples of the residual correlate by "
-        f"{result['left']['lag1']:.2f}, where white noise stays within ±{chance:.2f}."
+        f"[bold]2 Residual[/]  The residual is not white noise: the correlation of neighbouring samples is "
+        f"{result['left']['lag1']:.2f}; that of white noise is within ±{bound:.2f}."
     )
-    screen.print("[bold]3 What is missing[/]")
+    screen.print("[bold]3 Missing effects[/]")
     for sentence in in_words(explanation, unit):
         screen.print(f"  {escape(sentence)}")
     screen.print("[bold]4 Before and after[/]")
     screen.print(before_and_after(explanation, unit))
-    put_in = [
+    present = [
         f"{name} ({truth['rms_over_noise'][name]:.3g} times the noise)" for name in sorted(truth["effects"])
     ]
     screen.print(
-        f"What the simulator had put in: {join(put_in)}, the hum at {truth['hum_hz']:g} Hz; noise of "
-        f"{truth['noise_rms_um']:.3g} {escape(unit)}. What is left held out is "
-        f"{after['rms'] / truth['noise_rms_um']:.2f} times that noise."
+        f"The simulator contains {join(present)}. The hum is at {truth['hum_hz']:g} Hz. The noise is "
+        f"{truth['noise_rms_um']:.3g} {escape(unit)} rms. The error on held-out data is now "
+        f"{after['rms'] / truth['noise_rms_um']:.2f} times this noise."
     )
     say_written(screen, out, result["files"])

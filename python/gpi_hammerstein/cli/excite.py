@@ -1,4 +1,4 @@
-"""`gpi excite`: signals that show what an actuator does."""
+"""`gpi excite`: excitation signals for experiments."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,13 +20,13 @@ excite: typer.Typer = typer.Typer(
 )
 
 Rate = Annotated[float, typer.Option(help="Sampling rate in Hz.", show_default=False)]
-Duration = Annotated[float, typer.Option(help="Length in s.", show_default=False)]
+Duration = Annotated[float, typer.Option(help="Duration in s.", show_default=False)]
 Range = Annotated[
     tuple[float, float], typer.Option("--range", help="Smallest and largest value.", metavar="LOW HIGH")
 ]
-Slew = Annotated[float | None, typer.Option(help="Largest slope in units per second.")]
-Seed = Annotated[int, typer.Option(min=0, help="Another seed gives another signal of the same kind.")]
-Unit = Annotated[str, typer.Option(help="Unit of the signal, for the column's name.")]
+Slew = Annotated[float | None, typer.Option(help="Largest slope, in units per second.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")]
+Unit = Annotated[str, typer.Option(help="Unit of the signal, for the name of the column.")]
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE.csv", help="File to write.")]
 
 
@@ -40,15 +40,19 @@ def multisine(
     range_: Range,
     out: Out,
     slew: Slew = None,
-    odd: Annotated[bool, typer.Option("--odd", help="Excite odd lines only.")] = False,
+    odd: Annotated[bool, typer.Option("--odd", help="Excite only odd spectral lines.")] = False,
     detection: Annotated[
-        bool, typer.Option("--detection", help="Odd lines, one in four left out to show nonlinearities.")
+        bool,
+        typer.Option(
+            "--detection",
+            help="Excite only odd spectral lines, and leave out one in four of them to detect nonlinearity.",
+        ),
     ] = False,
     seed: Seed = 0,
     unit: Unit = "V",
     as_json: options.Json = False,
 ) -> None:
-    """Write one period of a random-phase multisine, flat in the band; repeat it to see the steady state."""
+    """Write one period of a random-phase multisine, flat in the band. Repeat it to reach the steady state."""
     samples = count(rate, duration)
     u = native.multisine(samples, rate, band, range_, seed=seed, odd=odd, detection=detection, slew=slew)
     kind = {"kind": "multisine", "band_hz": band, "odd": odd, "detection": detection, "seed": seed}
@@ -59,7 +63,9 @@ def multisine(
 def prbs(
     rate: Rate,
     duration: Duration,
-    clock: Annotated[float, typer.Option(help="How often the signal may switch, in Hz.", show_default=False)],
+    clock: Annotated[
+        float, typer.Option(help="Frequency at which the signal may switch, in Hz.", show_default=False)
+    ],
     range_: Range,
     out: Out,
     slew: Slew = None,
@@ -67,7 +73,7 @@ def prbs(
     unit: Unit = "V",
     as_json: options.Json = False,
 ) -> None:
-    """Write a pseudo-random binary signal: the most power for a given range."""
+    """Write a pseudo-random binary signal, which has the largest power for a given range."""
     u = native.prbs(count(rate, duration), rate, clock, range_, seed=seed, slew=slew)
     finish(u, {"kind": "prbs", "clock_hz": clock, "seed": seed}, rate, unit, out, as_json)
 
@@ -76,14 +82,14 @@ def prbs(
 def triangle(
     rate: Rate,
     duration: Duration,
-    frequency: Annotated[float, typer.Option(help="Triangles per second, in Hz.", show_default=False)],
+    frequency: Annotated[float, typer.Option(help="Frequency of the triangle, in Hz.", show_default=False)],
     range_: Range,
     out: Out,
     slew: Slew = None,
     unit: Unit = "V",
     as_json: options.Json = False,
 ) -> None:
-    """Write triangles whose amplitude falls to zero: nested hysteresis loops, largest first."""
+    """Write a triangle whose amplitude decreases to zero, for nested hysteresis loops, the largest first."""
     u = native.decaying_triangle(count(rate, duration), rate, frequency, range_, slew=slew)
     finish(u, {"kind": "triangle", "frequency_hz": frequency}, rate, unit, out, as_json)
 
@@ -98,7 +104,7 @@ def steps(
     unit: Unit = "V",
     as_json: options.Json = False,
 ) -> None:
-    """Write a step to each end and to the middle, held for a quarter of the time: creep and drift."""
+    """Write steps to each end and the middle, each held for a quarter of the time: for creep and drift."""
     u = native.held_steps(count(rate, duration), rate, range_, slew=slew)
     finish(u, {"kind": "steps"}, rate, unit, out, as_json)
 
@@ -119,9 +125,9 @@ def count(rate: float, duration: float) -> int:
 def finish(
     u: NDArray[np.float64], kind: Mapping[str, Any], rate: float, unit: str, out: Path, as_json: bool
 ) -> None:
-    """Write the signal and print its figures."""
-    swing = u - u.mean()
-    rms = float(np.sqrt(np.mean(swing**2)))
+    """Write the signal to a file and print its properties."""
+    centred = u - u.mean()
+    rms = float(np.sqrt(np.mean(centred**2)))
     result = {
         "schema": "gpi-excitation/1",
         **kind,
@@ -132,7 +138,7 @@ def finish(
         "max": float(u.max()),
         "mean": float(u.mean()),
         "rms": rms,
-        "crest_factor": float(np.abs(swing).max()) / rms if rms > 0 else None,
+        "crest_factor": float(np.abs(centred).max()) / rms if rms > 0 else None,
         "max_slew": float(np.abs(np.diff(u)).max()) * rate,
         "file": str(out),
     }
@@ -145,7 +151,7 @@ def finish(
     console().print(
         f"{kind['kind']}: {len(u)} samples at {rate:g} Hz, "
         f"{result['min']:.4g} to {result['max']:.4g} {unit}, rms about its mean {rms:.4g} {unit}, "
-        f"crest factor {crest}, steepest {result['max_slew']:.4g} {unit}/s\n"
+        f"crest factor {crest}, largest slope {result['max_slew']:.4g} {unit}/s\n"
         f"Written to {out}",
         markup=False,
     )

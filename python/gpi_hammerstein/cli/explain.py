@@ -1,4 +1,4 @@
-"""`gpi explain`: what a record's model lacks, and the error before and after."""
+"""`gpi explain`: find the effects that a model lacks, and compare the error before and after."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -45,55 +45,67 @@ def explain(
     experiments: options.Experiments = None,
     holdout_record: Annotated[
         Path | None,
-        typer.Option(help="Another experiment of the same actuator to test on.", metavar="FILE"),
+        typer.Option(help="Another experiment of the same actuator for the test.", metavar="FILE"),
     ] = None,
     effects: Annotated[
         str | None,
         typer.Option(
-            help="Effects that may be added, joined by commas; all unless given, `none` for none.",
+            help="Effects that may be added, separated by commas. Default: all. `none`: no effect.",
             metavar="A,B",
         ),
     ] = None,
     require: Annotated[
         str | None,
-        typer.Option(help="Effects that are added whatever they gain, joined by commas.", metavar="A,B"),
+        typer.Option(
+            help="Effects that are added even if they are not significant, separated by commas.",
+            metavar="A,B",
+        ),
     ] = None,
     order: Annotated[
         int | None,
         typer.Option(
-            min=1, help="States of the linear part; more are then an effect.", rich_help_panel=MODEL
+            min=1,
+            help="Order of the linear part. Additional states are then an effect.",
+            rich_help_panel=MODEL,
         ),
     ] = None,
     half_widths: Annotated[
         str | None,
-        typer.Option(help="Number of plays, or half-widths.", rich_help_panel=MODEL, metavar="N|R1,R2,.."),
+        typer.Option(
+            help="Number of plays, or their half-widths.", rich_help_panel=MODEL, metavar="N|R1,R2,.."
+        ),
     ] = None,
     thresholds: Annotated[
         str | None,
-        typer.Option(help="Number of deadzones, or thresholds.", rich_help_panel=MODEL, metavar="N|H1,H2,.."),
+        typer.Option(
+            help="Number of deadzones, or their thresholds.", rich_help_panel=MODEL, metavar="N|H1,H2,.."
+        ),
     ] = None,
     delay: Annotated[
         int | None,
-        typer.Option(min=0, help="Makes G a gain with this delay, in samples.", rich_help_panel=MODEL),
+        typer.Option(min=0, help="Make G a gain with this delay, in samples.", rich_help_panel=MODEL),
     ] = None,
     reading: Annotated[
         Literal["one-sided", "directional"],
-        typer.Option(help="Deadzones: of u alone, or of its direction too.", rich_help_panel=MODEL),
+        typer.Option(
+            help="Deadzone convention: a function of u alone, or of u and its direction.",
+            rich_help_panel=MODEL,
+        ),
     ] = "one-sided",
     out: options.Out = None,
     report: Annotated[
-        bool, typer.Option("--report", help="Write report.html, one page with all of it, to DIR too.")
+        bool, typer.Option("--report", help="Also write report.html, one page with all results, to DIR.")
     ] = False,
     as_json: options.Json = False,
 ) -> int:
-    """Find out what a record's model lacks, add it, and report the error before and after.
+    """Find the effects that a model lacks, add them, and compare the error before and after.
 
-    Effects are confirmed on blocks of the record that take no part in any fit. Once the declared model is
-    identified, Ctrl-C ends the search and keeps what was found. Writes model.json, explanation.json and
-    pictures to DIR.
+    Held-out blocks of the record, which are not used for any fit, confirm the effects. After the declared
+    model is identified, Ctrl-C stops the search and keeps the effects found so far. Writes model.json,
+    explanation.json and pictures to DIR.
     """
     if report and out is None:
-        raise ParameterError("`report`: name the folder that it goes to (-o DIR), or use gpi report")
+        raise ParameterError("`report`: name the folder for report.html (-o DIR), or use gpi report")
     read: dict[str, Any] = {
         "input": input,
         "output": output,
@@ -137,28 +149,30 @@ def explained(
     holdout_record: Path | None,
     **choices: Any,
 ) -> tuple[Recording, Explanation, str]:
-    """Read records and explain them; says where the result is tested."""
+    """Read records and explain them. Return also a description of the test data."""
     recording = options.read(records, **read, experiments=experiments)
     if holdout_record is not None and holdout_record.suffix == ".npy":
-        raise ParameterError(
-            f"`holdout-record` = {holdout_record}: a .npy file has no output of its own; use .npz"
-        )
+        raise ParameterError(f"`holdout-record` = {holdout_record}: a .npy file contains no output; use .npz")
     other = None if holdout_record is None else options.read([holdout_record], **read).record()
     with progress_bar() as progress:
         found = native.explain(recording.record(), other, progress=progress, **choices)
-    where = "blocks of time spread over the record" if other is None else f"another record: {holdout_record}"
+    where = (
+        "blocks of time that are distributed over the record"
+        if other is None
+        else f"another record: {holdout_record}"
+    )
     return recording, found, where
 
 
 def split_effects(text: str | None) -> list[str] | None:
-    """Read names joined by commas; ``none`` is an empty list."""
+    """Parse names that are separated by commas; ``none`` is an empty list."""
     if text is None:
         return None
     return [name.strip() for name in text.split(",") if name.strip() not in ("", "none")]
 
 
 def summarise(screen: Console, result: dict[str, Any], unit: str, out: Path | None) -> None:
-    """Print what was found for people to read."""
+    """Print the result as text."""
     record = result["record"]
     screen.print(
         f"{record['samples']} samples at {record['rate_hz']:g} Hz in {record['experiments']} experiment(s): "
@@ -166,7 +180,7 @@ def summarise(screen: Console, result: dict[str, Any], unit: str, out: Path | No
     )
     for note in record["notes"]:
         screen.print(f"[yellow]note[/] {escape(note)}")
-    screen.print(f"Held out: {escape(result['holdout'])}")
+    screen.print(f"Held-out data: {escape(result['holdout'])}")
     screen.print(before_and_after(result, unit))
     for sentence in in_words(result, unit):
         screen.print(escape(sentence))
@@ -187,7 +201,7 @@ def before_and_after(result: Mapping[str, Any], unit: str) -> Table:
 
 
 def page_of(found: Explanation, command: str, notes: list[str]) -> str:
-    """Return the report."""
+    """Return the HTML report."""
     from gpi_hammerstein.report import report_html
 
     with working("drawing"):
@@ -197,7 +211,7 @@ def page_of(found: Explanation, command: str, notes: list[str]) -> str:
 def write_results(
     out: Path, found: Explanation, result: dict[str, Any], name: str, page: str | None = None
 ) -> None:
-    """Write model.json, pictures and `result` as the file `name` to a folder; note the files in `result`."""
+    """Write model.json, pictures and the file `name` with `result` to a folder; add the files to `result`."""
     with files.staged(out) as folder, working("drawing"):
         write_pictures(folder, found)
         if page is not None:
@@ -208,7 +222,7 @@ def write_results(
 
 
 def write_pictures(folder: Path, found: Explanation) -> None:
-    """Draw the residual before and after, and the loop."""
+    """Draw the residual before and after, and the hysteresis loop."""
     from gpi_hammerstein import plot
 
     write_residual_pictures(folder, plot.Residuals.of_explanation(found))

@@ -1,4 +1,4 @@
-"""`gpi export`: a compensator as source code."""
+"""`gpi export`: write a compensator as source code."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -14,16 +14,16 @@ from gpi_hammerstein.cli.simulate import ModelFile
 from gpi_hammerstein.export import export_c, export_rust
 
 Rust = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Write a Rust module, such as compensator.rs.")
+    Path | None, typer.Option(metavar="FILE", help="Write a Rust module, for example compensator.rs.")
 ]
-C = Annotated[Path | None, typer.Option("--c", metavar="DIR", help="Write NAME.h and NAME.c, in C99.")]
+C = Annotated[Path | None, typer.Option("--c", metavar="DIR", help="Write NAME.h and NAME.c in C99.")]
 Limits = Annotated[
-    str | None, typer.Option(metavar="LOW,HIGH", help="Lowest and highest drive, in the input's unit.")
+    str | None, typer.Option(metavar="LOW,HIGH", help="Lowest and highest drive, in the unit of the input.")
 ]
 PrecisionOption = Annotated[
-    Literal["single", "double"], typer.Option(help="The number type: float and f32, or double and f64.")
+    Literal["single", "double"], typer.Option(help="Number type: float and f32, or double and f64.")
 ]
-Name = Annotated[str, typer.Option(help="Begins the names of files, types and functions in C.")]
+Name = Annotated[str, typer.Option(help="Prefix of the names of files, types and functions in C.")]
 
 
 def export(
@@ -34,13 +34,15 @@ def export(
     precision: PrecisionOption = "single",
     name: Name = "gpi_compensator",
 ) -> None:
-    """Write a compensator for a microcontroller: from a reference to the drive, one sample after the other.
+    """Write a compensator for a microcontroller, which computes the drive from a reference sample by sample.
 
-    It undoes hysteresis and creep exactly, and of the dynamics their DC gain. The code needs no heap and no
-    library; the model's hash, units and limits are in its comments.
+    It compensates hysteresis and creep exactly. Of the dynamics it compensates only the DC gain. The code
+    needs no heap and no library. Its comments contain the hash of the model, the units and the limits.
     """
     if rust is None and c is None:
-        raise ParameterError("nothing to write: name a file (--rust own.rs) or a folder (--c compensator)")
+        raise ParameterError(
+            "nothing to write: name a file (--rust compensator.rs) or a folder (--c compensator)"
+        )
     model = files.load_model(model_file)
     pair = None if limits is None else read_pair(limits)
     written = []
@@ -51,7 +53,7 @@ def export(
         compensator = export_c(model, c, limits=pair, precision=precision, name=name)
         written += [c / f"{name}.h", c / f"{name}.c"]
     screen = console()
-    screen.print(f"Undone: {', '.join(compensator.compensated)}.")
+    screen.print(f"Compensated: {', '.join(compensator.compensated)}.")
     for part, why in compensator.left:
-        screen.print(f"[yellow]left[/] {part}: {escape(why)}.")
+        screen.print(f"[yellow]not compensated[/] {part}: {escape(why)}.")
     screen.print("Written: " + ", ".join(escape(str(file)) for file in written))

@@ -1,4 +1,4 @@
-"""What an identification found, for JSON and for people."""
+"""The result of an identification, as JSON and as text."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,16 +14,16 @@ from gpi_hammerstein._native import Identification, Model, Refinement
 from gpi_hammerstein.cli.output import error_table, mean_and_start, say_written
 
 HOW = {
-    "repeated-periods": "where the input repeats itself",
-    "rests": "where the input rests",
-    "high-frequency-residual": "in the highest frequencies of the residual",
+    "repeated-periods": "from repeated periods of the input",
+    "rests": "from intervals of constant input",
+    "high-frequency-residual": "from the highest frequencies of the residual",
 }
-# How many names stand for a combination of parameters.
+# Number of names that are printed for a combination of parameters.
 SHOWN_NAMES = 3
 
 
 def describe_model(model: Model) -> dict[str, Any]:
-    """Return the part of a result that says what was fitted."""
+    """Return the part of a result that describes the model."""
     return {
         "order": model.linear.order,
         "poles": model.linear.poles,
@@ -39,7 +39,7 @@ def describe_model(model: Model) -> dict[str, Any]:
 
 
 def describe_identification(found: Identification | None) -> dict[str, Any]:
-    """Return what is known about the way to the structure."""
+    """Return the part of a result that describes the choice of the structure."""
     candidates = found.candidates if found else []
     delays = [row["delay"] for row in candidates if row["chosen"]]
     return {
@@ -53,7 +53,7 @@ def describe_identification(found: Identification | None) -> dict[str, Any]:
 
 
 def describe_refinement(model: Model) -> dict[str, Any]:
-    """Return how the joint refinement ended and how sure its parameters are."""
+    """Return the status of the joint refinement, and the uncertainty of its parameters."""
     refinement = model.refinement
     if refinement is None:
         return {}
@@ -79,7 +79,7 @@ def combined(rms: Sequence[float] | NDArray[np.float64]) -> float:
 def pole_deviations(poles: NDArray[np.complex128], refinement: Refinement) -> NDArray[np.complex128]:
     """Return the standard deviations of real and imaginary parts in the order of `poles`.
 
-    The poles of a dead time, which a refinement does not list, keep 0.
+    Poles of a dead time have the value 0, because a refinement does not list them.
     """
     deviations = np.zeros(len(poles), dtype=np.complex128)
     free = np.ones(len(poles), dtype=bool)
@@ -90,7 +90,7 @@ def pole_deviations(poles: NDArray[np.complex128], refinement: Refinement) -> ND
 
 
 def summarise(screen: Console, result: Mapping[str, Any], model: Model, unit: str, out: Path | None) -> None:
-    """Print what was found for people to read."""
+    """Print the result as text."""
     record = result["record"]
     screen.print(
         f"{record['samples']} samples at {record['rate_hz']:g} Hz in {record['experiments']} experiment(s): "
@@ -103,14 +103,18 @@ def summarise(screen: Console, result: Mapping[str, Any], model: Model, unit: st
     screen.print(
         f"Linear part: order {result['order']}, largest pole {model.linear.spectral_radius:.4f}"
         + (f", dead time {result['delay']} samples" if result["delay"] else "")
-        + ("" if result["excited"] is None else f" (the input excites {result['excited']} taps)")
+        + (
+            ""
+            if result["excited"] is None
+            else f" (order of persistent excitation of the input: {result['excited']})"
+        )
     )
     hysteresis = zip(model.input_names, result["half_widths"], result["thresholds"], strict=True)
     for name, plays, zones in hysteresis:
         screen.print(f"Hysteresis of {escape(name)}: {len(plays)} plays, {len(zones)} deadzones")
     if "status" in result:
         say_how_sure(screen, result, unit)
-    screen.print(f"Held out: {escape(result['holdout'])}")
+    screen.print(f"Held-out data: {escape(result['holdout'])}")
     screen.print(
         error_table(
             {"fitted": result["error"]["train"], "held out": result["error"]["holdout"]},
@@ -122,7 +126,7 @@ def summarise(screen: Console, result: Mapping[str, Any], model: Model, unit: st
 
 
 def candidate_table(candidates: Sequence[Mapping[str, Any]], unit: str) -> Table:
-    """Return the structures that were compared, the chosen one marked."""
+    """Return a table of the structures that were compared; the chosen one is marked."""
     table = Table(title="Structures compared", title_justify="left")
     label = f" [{unit}]" if unit else ""
     for name in (
@@ -133,7 +137,7 @@ def candidate_table(candidates: Sequence[Mapping[str, Any]], unit: str) -> Table
         "delay",
         f"rms{label}",
         "parameters",
-        "criterion above best",
+        "criterion minus best",
     ):
         table.add_column(escape(name), justify="right")
     best = min(row["criterion"] for row in candidates)
@@ -150,19 +154,22 @@ def candidate_table(candidates: Sequence[Mapping[str, Any]], unit: str) -> Table
 
 
 def say_how_sure(screen: Console, result: Mapping[str, Any], unit: str) -> None:
-    """Print the residual against the noise floor, and what the data leave open."""
+    """Print the residual, the noise floor, and the unidentifiable parameters."""
     floor, rms = result["noise_floor"], result["residual_rms"]
     ratio = f", {rms / floor['rms']:.2f} times the noise floor" if floor["rms"] > 0 else ""
     screen.print(
         escape(f"Residual {rms:.4g} {unit}".rstrip() + ratio)
         + escape(f" of {floor['rms']:.4g} {unit}".rstrip() if ratio else "")
-        + f", seen {HOW.get(floor['how'], floor['how'])}"
+        + f", estimated {HOW.get(floor['how'], floor['how'])}"
     )
     if result["outliers"]:
-        treatment = "weighed down" if result["robust"] else "weighed like all samples (see --robust)"
+        treatment = "with reduced weight" if result["robust"] else "with full weight (see --robust)"
         screen.print(f"Outliers: {result['outliers']} in the residual, {treatment}")
     if result["status"] != "converged":
-        why = {"limit": "took all its steps", "stalled": "found no shorter step that helps"}
+        why = {
+            "limit": "reached the maximum number of steps",
+            "stalled": "stopped, because no shorter step reduces the error",
+        }
         screen.print(f"[yellow]note[/] the refinement {why.get(result['status'], result['status'])}")
     for combination in result["undetermined"]:
         largest = sorted(combination, key=lambda part: -abs(part[1]))[:SHOWN_NAMES]

@@ -1,4 +1,4 @@
-"""`gpi identify`: from a record to a model."""
+"""`gpi identify`: identify a model from a record."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -38,51 +38,64 @@ def identify(
     experiments: options.Experiments = None,
     holdout_record: Annotated[
         Path | None,
-        typer.Option(help="Another experiment to test on.", rich_help_panel=HOLDOUT, metavar="FILE"),
+        typer.Option(help="Another experiment for the test.", rich_help_panel=HOLDOUT, metavar="FILE"),
     ] = None,
     holdout_experiments: Annotated[
         str | None,
-        typer.Option(help="Experiments to test on, counted from 0.", rich_help_panel=HOLDOUT, metavar="5"),
+        typer.Option(help="Experiments for the test, numbered from 0.", rich_help_panel=HOLDOUT, metavar="5"),
     ] = None,
     holdout: Annotated[
         float | None,
         typer.Option(
-            help="Share of every experiment, at its end, to test on; 0.2 unless other data are held out.",
+            help="Share at the end of every experiment for the test. Default: 0.2, unless other data are "
+            "held out.",
             rich_help_panel=HOLDOUT,
             show_default=False,
         ),
     ] = None,
-    taps: Annotated[int | None, typer.Option(min=1, help="Taps of the FIR.", rich_help_panel=MODEL)] = None,
+    taps: Annotated[
+        int | None, typer.Option(min=1, help="Number of FIR taps.", rich_help_panel=MODEL)
+    ] = None,
     order: Annotated[
-        int | None, typer.Option(min=0, help="States of the linear part.", rich_help_panel=MODEL)
+        int | None,
+        typer.Option(min=0, help="Order (number of states) of the linear part.", rich_help_panel=MODEL),
     ] = None,
     half_widths: Annotated[
         str | None,
-        typer.Option(help="Number of plays, or half-widths.", rich_help_panel=MODEL, metavar="N|R1,R2,.."),
+        typer.Option(
+            help="Number of plays, or their half-widths.", rich_help_panel=MODEL, metavar="N|R1,R2,.."
+        ),
     ] = None,
     thresholds: Annotated[
         str | None,
-        typer.Option(help="Number of deadzones, or thresholds.", rich_help_panel=MODEL, metavar="N|H1,H2,.."),
+        typer.Option(
+            help="Number of deadzones, or their thresholds.", rich_help_panel=MODEL, metavar="N|H1,H2,.."
+        ),
     ] = None,
     delay: Annotated[
         int | None,
-        typer.Option(min=0, help="Makes G a gain with this delay, in samples.", rich_help_panel=MODEL),
+        typer.Option(min=0, help="Make G a gain with this delay, in samples.", rich_help_panel=MODEL),
     ] = None,
     reading: Annotated[
         Literal["one-sided", "directional"],
-        typer.Option(help="Deadzones: of u alone, or of its direction too.", rich_help_panel=MODEL),
+        typer.Option(
+            help="Deadzone convention: a function of u alone, or of u and its direction.",
+            rich_help_panel=MODEL,
+        ),
     ] = "one-sided",
     offset_knots: Annotated[
         int,
         typer.Option(
-            min=1, help="Knots of each experiment's offset; 2 or more let it drift.", rich_help_panel=MODEL
+            min=1,
+            help="Knots of the offset of each experiment. With 2 or more, the offset may drift.",
+            rich_help_panel=MODEL,
         ),
     ] = 1,
     robust: Annotated[
         bool | None,
         typer.Option(
             "--robust/--no-robust",
-            help="Weigh outliers down; decided by the data unless given.",
+            help="Give outliers less weight. Default: chosen from the data.",
             rich_help_panel=MODEL,
             show_default=False,
         ),
@@ -92,7 +105,7 @@ def identify(
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
-    """Fit hysteresis and linear dynamics to a record, and test them on data that took no part.
+    """Identify hysteresis and linear dynamics from a record, and test the model on held-out data.
 
     Writes model.json, identification.json and pictures to DIR.
     """
@@ -122,10 +135,10 @@ def identify(
             progress=progress,
         )
     if model.identification is not None:
-        # What the fit could not use for want of a known past is no error of the model.
+        # Samples that depend on the unknown initial state were not used for the fit, and are not scored.
         train = raise_warmup(train, model.identification.warmups)
     held_out = None if test is None else model.error(test, remove_mean=remove_mean, fit_start=fit_start)
-    # What was before the training data was part of the fit.
+    # The initial state of the training data was part of the fit.
     error = {"train": model.error(train, remove_mean=remove_mean, fit_start=True), "holdout": held_out}
     result = {
         "schema": "gpi-identification/1",
@@ -159,7 +172,7 @@ def hold_out(
     holdout_experiments: str | None,
     holdout: float | None,
 ) -> tuple[Record, Record | None, str]:
-    """Return what to fit on, what to test on, and one sentence about the latter."""
+    """Return the training data, the test data, and a description of the test data."""
     given = [
         name
         for name, value in (
@@ -170,11 +183,11 @@ def hold_out(
         if value is not None
     ]
     if len(given) > 1:
-        raise ParameterError(f"{given[0]} and {given[1]} exclude each other; give one of them")
+        raise ParameterError(f"{given[0]} and {given[1]} exclude each other; give only one of them")
     if holdout_record is not None:
         if holdout_record.suffix == ".npy":
             raise ParameterError(
-                f"`holdout-record` = {holdout_record}: a .npy file has no output of its own; hold out "
+                f"`holdout-record` = {holdout_record}: a .npy file contains no output; hold out "
                 "experiments of the record (--holdout-experiments) or use .npz"
             )
         other = options.read([holdout_record], **read)
@@ -193,6 +206,6 @@ def hold_out(
         return recording.record(), None, "none"
     share = 0.2 if holdout is None else holdout
     if not 0 < share < 1:
-        raise ParameterError(f"`holdout` = {holdout}: the share must lie between 0 and 1")
+        raise ParameterError(f"`holdout` = {holdout}: the share must be between 0 and 1")
     train, test = recording.record().split(1 - share)
     return train, test, f"the last {100 * share:g} % of every experiment in time"

@@ -1,4 +1,4 @@
-"""Options that several commands share, and how their text is read."""
+"""Options that several commands share, and the functions that parse them."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,14 +14,17 @@ Records = Annotated[
     list[Path],
     typer.Argument(
         metavar="RECORD",
-        help="Files of one actuator: .csv, .csv.gz, .parquet, .npz, .npy (see --output) or .mat.",
+        help="Record files of one actuator: .csv, .csv.gz, .parquet, .npz, .npy (see --output) or .mat.",
         show_default=False,
     ),
 ]
 Input = Annotated[
     list[str] | None,
     typer.Option(
-        "--input", "-u", help="Input columns; `u`, `u1`, `voltage` are found.", rich_help_panel=COLUMNS
+        "--input",
+        "-u",
+        help="Input columns. Names such as `u`, `u1`, `voltage` are recognised.",
+        rich_help_panel=COLUMNS,
     ),
 ]
 Output = Annotated[
@@ -29,13 +32,14 @@ Output = Annotated[
     typer.Option(
         "--output",
         "-y",
-        help="Output columns; `y`, `y1`, `position` are found. For .npy records: .npy files of the outputs.",
+        help="Output columns. Names such as `y`, `y1`, `position` are recognised. For .npy records, give the "
+        ".npy files of the outputs.",
         rich_help_panel=COLUMNS,
     ),
 ]
 Time = Annotated[
     str | None,
-    typer.Option("--time", help="Time column; `t` and `time` are found.", rich_help_panel=COLUMNS),
+    typer.Option("--time", help="Time column. `t` and `time` are recognised.", rich_help_panel=COLUMNS),
 ]
 Rate = Annotated[
     float | None,
@@ -45,7 +49,7 @@ Covariate = Annotated[
     list[str] | None,
     typer.Option(
         "--covariate",
-        help="Other measured columns; all other columns unless named. `none` leaves them out.",
+        help="Other measured columns. Default: all other columns. `none` ignores them.",
         rich_help_panel=COLUMNS,
     ),
 ]
@@ -54,8 +58,8 @@ Resample = Annotated[
     typer.Option(
         "--resample",
         metavar="RATE|auto",
-        help="Make the sampling uniform: interpolate linearly to RATE in Hz (`auto`: the usual step) and cut "
-        "the record at gaps and where the clock jumps back.",
+        help="Make the sampling uniform: interpolate linearly to RATE in Hz (`auto`: the median time step), "
+        "and cut the record at gaps and where the clock jumps back.",
         rich_help_panel=COLUMNS,
     ),
 ]
@@ -65,22 +69,24 @@ Warmup = Annotated[
 ]
 Experiments = Annotated[
     str | None,
-    typer.Option("--experiments", metavar="0-4,7", help="Experiments to use, counted from 0."),
+    typer.Option("--experiments", metavar="0-4,7", help="Experiments to use, numbered from 0."),
 ]
 RemoveMean = Annotated[
     bool,
-    typer.Option("--remove-mean", help="Leave a constant offset (a sensor's zero) out of the error."),
+    typer.Option(
+        "--remove-mean", help="Remove a constant offset, such as the zero of a sensor, from the error."
+    ),
 ]
 FitStart = Annotated[
     bool,
     typer.Option(
         "--fit-start",
-        help="Score held-out data from a fitted past (plays, state) where they begin in motion.",
+        help="Fit the unknown initial state (plays, dynamics) of the tested record.",
     ),
 ]
 Out = Annotated[
     Path | None,
-    typer.Option("--out", "-o", metavar="DIR", help="Folder for what is written.", show_default=False),
+    typer.Option("--out", "-o", metavar="DIR", help="Folder for the output files.", show_default=False),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
 
@@ -97,7 +103,7 @@ def read(
     warmup: int | None,
     experiments: str | None = None,
 ) -> Recording:
-    """Read a record as the options say."""
+    """Read a record according to the options."""
     return read_recording(
         list(files),
         input=split_names(input),
@@ -112,14 +118,14 @@ def read(
 
 
 def split_names(names: list[str] | None) -> list[str] | None:
-    """Split names that are joined by commas."""
+    """Split names that are separated by commas."""
     if not names:
         return None
     return [part.strip() for name in names for part in name.split(",") if part.strip()]
 
 
 def parse_resample(text: str | None) -> bool | float | None:
-    """Read ``auto`` or a rate in Hz."""
+    """Parse ``auto`` or a rate in Hz."""
     if text is None:
         return None
     if text.strip().lower() == "auto":
@@ -127,11 +133,11 @@ def parse_resample(text: str | None) -> bool | float | None:
     try:
         return float(text)
     except ValueError:
-        raise ParameterError(f"`resample` = {text}: write a rate in Hz, or `auto`") from None
+        raise ParameterError(f"`resample` = {text}: must be a rate in Hz or `auto`") from None
 
 
 def parse_numbers(name: str, text: str | None) -> int | list[float] | None:
-    """Read a count (one whole number) or a list of numbers joined by commas."""
+    """Parse a count (one integer) or a list of numbers that are separated by commas."""
     if text is None:
         return None
     parts = [part.strip() for part in text.split(",") if part.strip()]
@@ -142,5 +148,5 @@ def parse_numbers(name: str, text: str | None) -> int | list[float] | None:
     except ValueError:
         numbers = []
     if not numbers:
-        raise ParameterError(f"`{name}` = {text}: write how many there shall be, or numbers joined by commas")
+        raise ParameterError(f"`{name}` = {text}: must be a count, or numbers separated by commas")
     return numbers

@@ -1,4 +1,4 @@
-"""What a command prints and writes."""
+"""Output of commands: messages, tables, JSON and pictures."""
 
 import json
 import math
@@ -24,9 +24,9 @@ Figures = Mapping[str, float] | None
 
 
 def complain(problem: Exception | str, code: int) -> int:
-    """Print one line about what went wrong to stderr and return the exit code."""
+    """Print an error message of one line on stderr, and return the exit code."""
     if isinstance(problem, Exception) and not isinstance(problem, GpiError):
-        text = f"{type(problem).__name__}: {problem} (GPI_DEBUG=1 shows where)"
+        text = f"{type(problem).__name__}: {problem} (GPI_DEBUG=1 shows the traceback)"
     else:
         text = str(problem)
     print(f"gpi: {text}", file=sys.stderr)
@@ -34,7 +34,7 @@ def complain(problem: Exception | str, code: int) -> int:
 
 
 def plain(value: Any) -> Any:
-    """Turn arrays into lists and numbers that are not finite into None, for JSON."""
+    """Convert arrays to lists, and numbers that are not finite to None, for JSON."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
@@ -56,22 +56,22 @@ def print_json(result: Mapping[str, Any]) -> None:
 
 
 def write_json(result: Mapping[str, Any], path: Path) -> None:
-    """Write one JSON object to a file, for people to read as well."""
+    """Write one JSON object to a file, in an indented form."""
     path.write_text(json.dumps(plain(result), allow_nan=False, indent=2) + "\n")
 
 
 def console() -> Console:
-    """Return the console that summaries are printed on."""
+    """Return the console for summaries."""
     screen = Console(highlight=False, soft_wrap=True)
     if not screen.is_terminal:
-        # A file or a pipe has no width that numbers would have to be cut to.
+        # A file or a pipe has no width: numbers must not be cut.
         screen.width = 120
     return screen
 
 
 @contextmanager
 def working(what: str) -> Iterator[None]:
-    """Show on stderr, if it is a terminal, that something is going on."""
+    """Show an activity message on stderr, if stderr is a terminal."""
     errors = Console(stderr=True)
     with errors.status(what) if errors.is_terminal else nullcontext():
         yield
@@ -79,24 +79,24 @@ def working(what: str) -> Iterator[None]:
 
 @contextmanager
 def progress_bar() -> Iterator[Callable[[str, float], None] | None]:
-    """Yield a function that draws a bar on stderr, None if that is no terminal."""
+    """Yield a function that draws a progress bar on stderr; None if stderr is not a terminal."""
     errors = Console(stderr=True)
     if not errors.is_terminal:
         yield None
         return
-    # stages come and go, and none knows how many follow: the time that has passed, not what is left
+    # the number of phases is not known beforehand: show the elapsed time, not the remaining time
     columns = (TextColumn("{task.description}"), SpinnerColumn(), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=errors, transient=True) as bar:
         task = bar.add_task("", total=1.0)
 
-        def report(stage: str, done: float) -> None:
-            bar.update(task, description=stage, completed=done)
+        def report(phase: str, done: float) -> None:
+            bar.update(task, description=phase, completed=done)
 
         yield report
 
 
 def describe_record(recording: Recording, files: Sequence[Path | str]) -> dict[str, Any]:
-    """Return the part of a result that says what was read."""
+    """Return the part of a result that describes the record."""
     return {
         "files": [str(file) for file in files],
         "samples": sum(len(run.u) for run in recording.runs),
@@ -110,7 +110,7 @@ def describe_record(recording: Recording, files: Sequence[Path | str]) -> dict[s
 
 
 def error_table(rows: Mapping[str, Figures], unit: str = "", title: str = "Simulation error") -> Table:
-    """Return a table of error figures, one row a data set."""
+    """Return a table of error figures, with one row for each data set."""
     table = Table(title=title, title_justify="left")
     table.add_column("")
     label = f" [{unit}]" if unit else ""
@@ -131,18 +131,18 @@ def error_table(rows: Mapping[str, Figures], unit: str = "", title: str = "Simul
 
 
 def mean_and_start(mean_removed: bool, start_fitted: bool) -> str:
-    """Return what a title says about the way an error was taken."""
-    return (", mean removed" if mean_removed else "") + (", start fitted" if start_fitted else "")
+    """Return the part of a title that describes how the error was computed."""
+    return (", mean removed" if mean_removed else "") + (", initial state fitted" if start_fitted else "")
 
 
 def common_unit(record: Record) -> str:
-    """Return the unit of the outputs when they share one."""
+    """Return the unit of the outputs if they have the same unit, else an empty text."""
     units = set(record.output_units)
     return units.pop() if len(units) == 1 else ""
 
 
 def picture(path: Path, draw: Callable[["Axes"], object], width: float = 8.0, height: float = 4.5) -> None:
-    """Draw one PNG; no state of pyplot is touched."""
+    """Draw one PNG file, without use of the state of pyplot."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), dpi=120, layout="constrained")
@@ -151,6 +151,6 @@ def picture(path: Path, draw: Callable[["Axes"], object], width: float = 8.0, he
 
 
 def say_written(screen: Console, out: Path | None, files: Sequence[str]) -> None:
-    """Print which files were written."""
+    """Print the names of the files that were written."""
     if out is not None:
         screen.print(f"Written to {escape(str(out))}: {', '.join(files)}")

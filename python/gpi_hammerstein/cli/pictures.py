@@ -11,17 +11,17 @@ from gpi_hammerstein._native import GpiError, Model, Record
 from gpi_hammerstein.cli.output import picture
 from gpi_hammerstein.plot.signals import draw_loop
 
-# v-hat is worth a look while the noise that the inverse of G makes of the residual stays below this
-# fraction of the span of v.
+# v-hat is drawn only if its noise is below this fraction of the span of v. This noise is the residual,
+# amplified by the inverse of G.
 NOISE_SHARE = 0.05
 
 
 def write_pictures(
     folder: Path, model: Model, train: Record, test: Record | None, *, fit_start: bool = False
 ) -> None:
-    """Draw fit, residual, loop, responses, singular values and the structures compared.
+    """Draw the fit, the residual, the loop, responses, singular values and the structures that were compared.
 
-    `fit_start` is for `test`; the start of `train` was part of the fit.
+    `fit_start` applies to `test`. The initial state of `train` was part of the fit.
     """
     shown, fitted = (train, True) if test is None else (test, fit_start)
     picture(folder / "fit.png", partial(plot.fit, model, shown, fit_start=fitted), 10.0)
@@ -43,10 +43,10 @@ def write_pictures(
 
 
 def intermediate_seen(model: Model, record: Record) -> NDArray[np.float64] | None:
-    """Return v of the first experiment as its measured output shows it, or None where noise hides it.
+    """Return the estimate of v from the measured output of the first experiment, or None if it is too noisy.
 
-    Samples that the inverse of G does not reach are NaN. Only a model of one input and one output has
-    a loop of its own.
+    Samples at the ends that the inverse of G cannot estimate are NaN. The result is None for a model of
+    several inputs or outputs.
     """
     single = len(model.input_names) == len(model.output_names) == 1
     if not single:

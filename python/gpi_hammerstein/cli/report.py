@@ -1,4 +1,4 @@
-"""`gpi report`: one page that says what a record's model lacks."""
+"""`gpi report`: one HTML page with the results of `gpi explain`."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,7 +12,7 @@ from gpi_hammerstein.cli.explain import explained, split_effects
 from gpi_hammerstein.cli.output import common_unit, console, working
 from gpi_hammerstein.explanation import in_words, to_dict
 
-Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="The page.")]
+Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File for the page.")]
 
 
 def report(
@@ -28,17 +28,18 @@ def report(
     experiments: options.Experiments = None,
     holdout_record: Annotated[
         Path | None,
-        typer.Option(help="Another experiment of the same actuator to test on.", metavar="FILE"),
+        typer.Option(help="Another experiment of the same actuator for the test.", metavar="FILE"),
     ] = None,
     effects: Annotated[
         str | None,
-        typer.Option(help="Effects that may be added, joined by commas; all unless given.", metavar="A,B"),
+        typer.Option(help="Effects that may be added, separated by commas. Default: all.", metavar="A,B"),
     ] = None,
     out: Out = Path("report.html"),
 ) -> int:
-    """Explain a record and write one HTML page: verdict, errors, pictures, the quality of the data.
+    """Explain a record and write one HTML page: verdict, errors, effects, pictures, quality of the data.
 
-    The page needs no network and nothing else. `gpi explain --report` writes it beside the other results.
+    The page needs no network and no other files. `gpi explain --report` writes it together with the other
+    results.
     """
     from gpi_hammerstein.report import write_report
 
@@ -53,7 +54,7 @@ def report(
     }
     if not out.parent.is_dir():
         raise ParameterError(
-            f"`out` = {out}: cannot be written, there is no folder {out.parent}; make it first"
+            f"`out` = {out}: cannot be written: the folder {out.parent} does not exist; create it first"
         )
     chosen = split_effects(effects)
     recording, found, _ = explained(records, read, experiments, holdout_record, effects=chosen)

@@ -1,4 +1,4 @@
-"""Tests and pictures of a residual, as commands show them."""
+"""Tables and pictures of residual tests for commands."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +12,7 @@ from gpi_hammerstein.cli.output import picture
 if TYPE_CHECKING:
     from gpi_hammerstein.plot import Residuals
 
-# Where the structure that a test finds is seen best.
+# The picture that shows the structure of each test best.
 PICTURES = {
     "mean": "residual_time",
     "whiteness": "residual_autocorrelation",
@@ -31,12 +31,12 @@ PICTURES = {
 
 
 def file_name(kind: str, output: int, outputs: int) -> str:
-    """Return the name of a picture, numbered from 1 where there are several outputs."""
+    """Return the file name of a picture, numbered from 1 if there are several outputs."""
     return f"{kind}.png" if outputs == 1 else f"{kind}_{output + 1}.png"
 
 
 def name_pictures(tests: list[dict[str, Any]], outputs: Sequence[str], *, drawn: bool = True) -> None:
-    """Add to every test the ``picture`` that shows why it fails; None where it passes or none is drawn."""
+    """Add the ``picture`` to every failed test; it is None if the test passes or no pictures are drawn."""
     for test in tests:
         kind = PICTURES.get(test["name"], "residual_time")
         name = file_name(kind, outputs.index(test["output"]), len(outputs))
@@ -44,7 +44,7 @@ def name_pictures(tests: list[dict[str, Any]], outputs: Sequence[str], *, drawn:
 
 
 def write_residual_pictures(folder: Path, left: "Residuals") -> None:
-    """Draw every output's residual in time, over frequency, input, speed and lag."""
+    """Draw the residual of every output over time, frequency, input, speed and lag."""
     from gpi_hammerstein import plot
 
     outputs = len(left.record.output_names)
@@ -63,7 +63,7 @@ def write_residual_pictures(folder: Path, left: "Residuals") -> None:
 
 
 def tests_table(tests: Sequence[dict[str, Any]]) -> Table:
-    """Return the tests for people to read."""
+    """Return a table of the tests."""
     table = Table(title="Tests of the residual", title_justify="left")
     several = len({test["output"] for test in tests}) > 1
     names = ["output"] * several + ["test", "statistic", "threshold", "p-value", "passed", "points to"]

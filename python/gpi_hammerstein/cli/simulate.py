@@ -1,4 +1,4 @@
-"""`gpi simulate`: run a model on a record's input."""
+"""`gpi simulate`: simulate a model with the input of a record."""
 
 from pathlib import Path
 from typing import Annotated
@@ -22,8 +22,13 @@ from gpi_hammerstein.cli.output import (
 )
 from gpi_hammerstein.io import Recording
 
-ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="A model.json.", show_default=False)]
-Skip = Annotated[float, typer.Option(help="Seconds at the start that are not scored.", metavar="SECONDS")]
+ModelFile = Annotated[
+    Path, typer.Argument(metavar="MODEL", help="A model file (model.json).", show_default=False)
+]
+Skip = Annotated[
+    float,
+    typer.Option(help="Time at the start of every experiment that is not scored, in s.", metavar="SECONDS"),
+]
 
 
 def simulate(
@@ -43,10 +48,10 @@ def simulate(
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
-    """Simulate a model from a record's input alone, and compare with its output when it has one.
+    """Simulate a model from the input of a record, and compare the result with the output if there is one.
 
-    Writes simulated.csv (t, y or y1, y2, ..; with a leading column `experiment` when there are several)
-    to DIR.
+    Writes simulated.csv to DIR. Its columns are t and y, or t, y1, y2, ..; for several experiments, the first
+    column is `experiment`.
     """
     model = files.load_model(model_file)
     recording = options.read(
@@ -64,7 +69,7 @@ def simulate(
     record = recording.record() if recording.outputs else None
     if fit_start and record is None:
         raise ParameterError(
-            "`fit-start`: the record has no output column to fit to; name one (--output) or leave it out"
+            "`fit-start`: the record has no output column for the fit; name one (--output) or omit it"
         )
     with working("simulating"):
         error = None if record is None else model.error(record, remove_mean=remove_mean, fit_start=fit_start)
@@ -91,7 +96,7 @@ def simulate(
     for note in recording.notes:
         screen.print(f"[yellow]note[/] {note}", markup=True)
     if record is None:
-        screen.print("The record has no output column: nothing to compare with.")
+        screen.print("The record has no output column, so that no error can be computed.")
     else:
         title = "Simulation error" + mean_and_start(remove_mean, fit_start)
         screen.print(error_table({"record": error}, common_unit(record), title))
@@ -99,7 +104,7 @@ def simulate(
 
 
 def require_match(model: Model, recording: Recording) -> None:
-    """Refuse a record that the model was not made for."""
+    """Reject a record that does not match the model."""
     for what, ours, theirs in (
         ("inputs", len(model.input_names), len(recording.inputs)),
         ("outputs", len(model.output_names), len(recording.outputs) or len(model.output_names)),
@@ -126,9 +131,9 @@ def require_match(model: Model, recording: Recording) -> None:
 
 
 def simulated_table(model: Model, recording: Recording, start: Record | None = None) -> pl.DataFrame:
-    """Return time and simulated outputs of all experiments.
+    """Return the time and the simulated outputs of all experiments.
 
-    `start` is the same experiments with their outputs, where what was before them shall be fitted.
+    `start` is the record of the same experiments, if their initial states are to be fitted to its outputs.
     """
     fitted = None
     if start is not None:

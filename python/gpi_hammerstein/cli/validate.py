@@ -1,4 +1,4 @@
-"""`gpi validate`: what a model leaves unexplained on a record."""
+"""`gpi validate`: the error of a model on a record, and tests of its residual."""
 
 from typing import Any
 
@@ -24,7 +24,7 @@ from gpi_hammerstein.cli.residual import name_pictures, tests_table, write_resid
 from gpi_hammerstein.cli.simulate import ModelFile, Skip, require_match
 from gpi_hammerstein.explanation import failed_in_words
 
-# Sensor noise dominates the top of the band, dynamics and hysteresis the bottom.
+# Above this share of half the sampling rate, sensor noise dominates the residual.
 HIGH_BAND = 0.75
 
 
@@ -45,9 +45,9 @@ def validate(
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
-    """Measure a model's error on a record and test what it leaves for structure.
+    """Compute the error of a model on a record, and test its residual for structure.
 
-    The model may come from anywhere. Writes validation.json and pictures of the residual to DIR.
+    Accepts any gpi-model/1 file. Writes validation.json and pictures of the residual to DIR.
     """
     model = files.load_model(model_file)
     recording = options.read(
@@ -102,20 +102,20 @@ def validate(
     for row in figures:
         screen.print(
             escape(
-                f"{row['output']}: {row['rms']:.4g} rms without its mean; the noise, if white, "
-                f"{row['noise_rms']:.4g}"
+                f"{row['output']}: residual {row['rms']:.4g} rms without its mean; noise "
+                f"{row['noise_rms']:.4g} rms, if it is white"
             )
         )
-    left_over = "has structure" if residual["structured"] else "shows no more than noise"
-    screen.print(f"What the model leaves {left_over}.")
+    has = "has structure" if residual["structured"] else "has no structure beyond noise"
+    screen.print(f"The residual {has}.")
     say_written(screen, out, result["files"])
 
 
 def residual_figures(model: Model, record: Record, *, fit_start: bool = False) -> list[dict[str, Any]]:
-    """Return figures of the residual of every output, the mean of each experiment removed.
+    """Return figures of the residual of every output, without the mean of each experiment.
 
-    ``lag1`` is the correlation of neighbouring samples; ``noise_rms`` the rms of white noise with the
-    residual's power density above three quarters of half the rate, which noise shows alone.
+    ``lag1`` is the correlation of neighbouring samples. ``noise_rms`` is the rms of white noise whose power
+    density is that of the residual above three quarters of half the sampling rate, where noise dominates.
     """
     residuals = model.residual(record, fit_start=fit_start)
     scored = [values[warmup:] for values, warmup in zip(residuals, record.warmup, strict=True)]
@@ -126,7 +126,7 @@ def residual_figures(model: Model, record: Record, *, fit_start: bool = False) -
 
 
 def channel_figures(pieces: list[NDArray[np.float64]]) -> dict[str, float]:
-    """Return figures of one output's residual over its experiments."""
+    """Return figures of the residual of one output over its experiments."""
     centred = [piece - piece.mean() for piece in pieces]
     samples = sum(len(piece) for piece in centred)
     power = sum(float(piece @ piece) for piece in centred)

@@ -1,6 +1,6 @@
-"""Compensators as source code, for microcontrollers.
+"""Export of compensators as source code for microcontrollers.
 
-What is written holds the numbers of :meth:`Model.compensator` and needs nothing else: no heap, no library.
+The source code contains the parameters of :meth:`Model.compensator`. It needs no heap and no library.
 """
 
 import hashlib
@@ -35,26 +35,26 @@ def export_c(
     model
         A model of one input and one output.
     folder
-        Where the two files go; it is made when it does not exist.
+        The folder of the two files. It is created if it does not exist.
     limits
         Lowest and highest drive, in the input's unit.
     precision
         ``"single"`` for `float`, ``"double"`` for `double`.
     name
-        Begins the names of files, types and functions, so that several fit into one program.
+        Prefix of the names of files, types and functions. It allows several compensators in one program.
 
     Returns
     -------
     Compensator
-        What the code computes.
+        The compensator that the code implements.
 
     Raises
     ------
     ParameterError
-        Limits that leave nothing, a hysteresis without an inverse, a name that C cannot have, a folder that
-        cannot be written.
+        The limits leave no range, the hysteresis has no inverse, the name is not a valid C identifier, or the
+        folder cannot be written.
     DataError
-        Several inputs or outputs.
+        The model has several inputs or outputs.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def export_c(
     ['gpi_compensator.c', 'gpi_compensator.h']
     """
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
-        raise ParameterError(f"`name` = {name}: letters, digits and `_`, such as x_axis")
+        raise ParameterError(f"`name` = {name}: must contain only letters, digits and `_`, such as x_axis")
     compensator = model.compensator(limits=limits)
     real, largest, suffix = ("float", "FLT_MAX", "f") if precision == "single" else ("double", "DBL_MAX", "")
     numbers = written_numbers(compensator, precision, largest, suffix)
@@ -87,14 +87,14 @@ def export_rust(
     limits: tuple[float, float] | None = None,
     precision: Precision = "single",
 ) -> Compensator:
-    """Write a compensator in Rust, one module without dependencies that builds with and without `std`.
+    """Write a compensator in Rust: one module without dependencies, which compiles with and without `std`.
 
     Parameters
     ----------
     model
         A model of one input and one output.
     file
-        The file, such as ``src/compensator.rs``.
+        The file, for example ``src/compensator.rs``.
     limits
         Lowest and highest drive, in the input's unit.
     precision
@@ -103,14 +103,14 @@ def export_rust(
     Returns
     -------
     Compensator
-        What the code computes.
+        The compensator that the code implements.
 
     Raises
     ------
     ParameterError
-        Limits that leave nothing, a hysteresis without an inverse, a file that cannot be written.
+        The limits leave no range, the hysteresis has no inverse, or the file cannot be written.
     DataError
-        Several inputs or outputs.
+        The model has several inputs or outputs.
 
     Examples
     --------
@@ -127,9 +127,9 @@ def export_rust(
 def written_numbers(
     compensator: Compensator, precision: Precision, infinity: str, suffix: str
 ) -> dict[str, str]:
-    """Return every number that a template asks for, as shortly as it can be written without loss."""
+    """Return all numbers of a template, each in the shortest form without loss of precision."""
     if precision not in ("single", "double"):
-        raise ParameterError(f"`precision` = {precision}: single or double")
+        raise ParameterError(f"`precision` = {precision}: must be single or double")
     number = np.float32 if precision == "single" else np.float64
 
     def written(value: float) -> str:
@@ -176,7 +176,7 @@ def written_numbers(
 
 
 def described(model: Model, compensator: Compensator, begin: str) -> dict[str, str]:
-    """Return the title, the facts as comments, and the units."""
+    """Return the title, the properties of the model as comments, and the units."""
     input_unit, output_unit = model.input_units[0], model.output_units[0]
     low, high = compensator.hysteresis.limits
     between = "without limits" if np.isinf([low, high]).all() else f"from {low:g} to {high:g} {input_unit}"
@@ -185,12 +185,12 @@ def described(model: Model, compensator: Compensator, begin: str) -> dict[str, s
         f"Rate: {model.rate:g} samples a second.",
         f"Reference: {model.output_names[0]}{in_unit(output_unit)}.",
         f"Drive: {model.input_names[0]}{in_unit(input_unit)}, {between}.",
-        f"Undone: {', '.join(compensator.compensated)}.",
-        *(f"Left: {part}: {why}." for part, why in compensator.left),
+        f"Compensated: {', '.join(compensator.compensated)}.",
+        *(f"Not compensated: {part}: {why}." for part, why in compensator.left),
         f"Made by gpi-hammerstein {__version__}, `gpi export`.",
     ]
     return {
-        "title": f"The drive of {model.input_names[0]} for a reference of {model.output_names[0]}",
+        "title": f"Compensator: drive of {model.input_names[0]} for a reference of {model.output_names[0]}",
         "facts": "\n".join((begin + fact).rstrip() for fact in facts),
         "input_unit": in_unit(input_unit),
         "output_unit": in_unit(output_unit),
@@ -198,12 +198,12 @@ def described(model: Model, compensator: Compensator, begin: str) -> dict[str, s
 
 
 def in_unit(unit: str) -> str:
-    """Return a unit as part of a sentence."""
+    """Return a unit as a part of a sentence."""
     return f" in {unit}" if unit else ""
 
 
 def filled(template: str, compensator: Compensator, values: dict[str, str]) -> str:
-    """Return a template with its values; lines from `@creep` on, up to `@else` or `@end`, are for creep."""
+    """Return a template with its values. Lines from `@creep` to `@else` or `@end` are used only for creep."""
     creeps = len(compensator.creep_rates) > 0
     lines, wanted = [], True
     text = resources("gpi_hammerstein.export").joinpath("templates", template).read_text(encoding="utf-8")

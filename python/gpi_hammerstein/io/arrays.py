@@ -1,4 +1,4 @@
-"""Columns of numbers from NumPy and MATLAB files."""
+"""Reading of NumPy and MATLAB files."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -21,17 +21,18 @@ def read_npz(path: Path) -> list[Table]:
     Parameters
     ----------
     path
-        Arrays such as ``u``, ``y``, ``t``, ``rate``; see :func:`from_arrays` for their shapes.
+        The archive, with arrays such as ``u``, ``y``, ``t``, ``rate``; see :func:`from_arrays` for their
+        shapes.
 
     Returns
     -------
     list of Table
-        One table an experiment.
+        One table for each experiment.
 
     Raises
     ------
     DataError
-        No archive, no arrays of numbers, or arrays of unequal length.
+        The file is not an NPZ archive, has no arrays of numbers, or has arrays of different lengths.
 
     Examples
     --------
@@ -51,19 +52,19 @@ def read_npy_pair(input_path: Path, output_path: Path | None) -> list[Table]:
     Parameters
     ----------
     input_path
-        Array u; see :func:`from_arrays` for its shape.
+        File of the array u; see :func:`from_arrays` for its shape.
     output_path
-        Array y, as long as u; None for a record without output.
+        File of the array y, which has the same length as u; None for a record without output.
 
     Returns
     -------
     list of Table
-        One table an experiment, with columns u and y, or u1, u2, .. and y1, y2, ...
+        One table for each experiment, with columns u and y, or u1, u2, .. and y1, y2, ...
 
     Raises
     ------
     DataError
-        A file is missing or no array, or the arrays are of unequal length.
+        A file is missing or is not an array, or the arrays have different lengths.
 
     Examples
     --------
@@ -86,17 +87,18 @@ def read_mat(path: Path) -> list[Table]:
     Parameters
     ----------
     path
-        Variables such as ``u``, ``y``, ``t``, ``fs``; see :func:`from_arrays` for their shapes.
+        The file, with variables such as ``u``, ``y``, ``t``, ``fs``; see :func:`from_arrays` for their
+        shapes.
 
     Returns
     -------
     list of Table
-        One table an experiment.
+        One table for each experiment.
 
     Raises
     ------
     DataError
-        No MAT file, no arrays of numbers, or arrays of unequal length.
+        The file is not a MAT file, has no arrays of numbers, or has arrays of different lengths.
 
     Examples
     --------
@@ -125,7 +127,7 @@ def _read_hdf5(path: Path) -> dict[str, Any]:
     import h5py
 
     with h5py.File(path, "r") as file:
-        # MATLAB stores columns first.
+        # MATLAB stores arrays in column-major order.
         return {
             name: np.asarray(item).T
             for name, item in file.items()
@@ -134,28 +136,29 @@ def _read_hdf5(path: Path) -> dict[str, Any]:
 
 
 def from_arrays(arrays: Mapping[str, Any], source: str) -> list[Table]:
-    """Cut named arrays into columns.
+    """Divide named arrays into columns.
 
     Parameters
     ----------
     arrays
         Names and arrays of the shapes (samples,), (samples, channels), (samples, channels,
         realisations) or (samples, channels, realisations, periods). A scalar ``rate`` or ``fs`` is the
-        sampling rate in Hz, ``dt`` or ``Ts`` the sampling period in s. Arrays that are not numbers are
-        text columns.
+        sampling rate in Hz; a scalar ``dt`` or ``Ts`` is the sampling period in s. Arrays that do not contain
+        numbers are text columns.
     source
-        The file, for messages.
+        Name of the file, for messages.
 
     Returns
     -------
     list of Table
-        One a realisation. Its periods are joined in time; all but the last one are warm-up, so that
-        the steady state is scored.
+        One table for each realisation. Its periods are joined in time. All periods except the last one are
+        warm-up, so that only the steady state is scored.
 
     Raises
     ------
     DataError
-        No array of samples, arrays of unequal length, or an array with more channels than samples.
+        There is no array of samples, the arrays have different lengths, or an array has more channels than
+        samples.
 
     Examples
     --------
@@ -186,7 +189,7 @@ def from_arrays(arrays: Mapping[str, Any], source: str) -> list[Table]:
         if len(signals[name]) != len(signals[first]):
             raise DataError(
                 f"{source}: `{first}` has {len(signals[first])} samples, but `{name}` has "
-                f"{len(signals[name])}; they must be equal"
+                f"{len(signals[name])}; the lengths must be equal"
             )
     return [
         Table(f"{source} (realisation {index})" if count > 1 else source, columns, text, rate, warmup)
@@ -195,20 +198,20 @@ def from_arrays(arrays: Mapping[str, Any], source: str) -> list[Table]:
 
 
 def _samples_first(array: Array, name: str, source: str) -> Array:
-    """Shape an array (samples, channels, realisations, periods)."""
+    """Reshape an array to (samples, channels, realisations, periods)."""
     if array.ndim == 2 and array.shape[0] == 1:
         array = array.T
     if not 1 <= array.ndim <= 4 or array.size == 0:
         raise DataError(
             f"{source}: array `{name}` has the shape {array.shape}; it must be (samples, channels, "
-            "realisations, periods) or the first one, two or three of these, and not empty"
+            "realisations, periods) or the first one, two or three of these, and must not be empty"
         )
     array = array.reshape(*array.shape, *(1 for _ in range(4 - array.ndim)))
     samples, channels = array.shape[:2]
     if channels > samples:
         raise DataError(
             f"{source}: array `{name}` has {samples} samples of {channels} channels; "
-            "samples run along the first axis: transpose it"
+            "the first axis must be that of the samples: transpose the array"
         )
     return array
 
@@ -216,7 +219,7 @@ def _samples_first(array: Array, name: str, source: str) -> Array:
 def _realisations(
     signals: Mapping[str, Array], source: str
 ) -> Sequence[tuple[dict[Column, Array], int, int]]:
-    """Columns, warm-up and number of realisations, one entry a realisation."""
+    """Return the columns, the warm-up and the number of realisations, for each realisation."""
     samples = len(next(iter(signals.values())))
     count, periods = max(array.shape[2:] for array in signals.values())
     for name, array in signals.items():

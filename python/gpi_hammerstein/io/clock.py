@@ -1,4 +1,4 @@
-"""From time stamps to a sampling rate, by cutting and resampling where that is asked for."""
+"""Sampling rates from time stamps, and resampling."""
 
 from dataclasses import dataclass
 
@@ -9,49 +9,49 @@ from gpi_hammerstein._native import DataError, ParameterError, time_axis
 
 Array = NDArray[np.float64]
 
-# A pause longer than this many usual steps is a cut, not a stretch to interpolate over.
+# A pause longer than this number of median steps is a cut; shorter pauses are interpolated.
 GAP_STEPS = 10.0
-# A finer grid is a slip of the unit, and would fill the memory.
+# A finer grid is most likely a wrong unit, and would need too much memory.
 MOST_REFINED = 100.0
 
 HINT = (
-    "; --resample auto (resample=True) does that: it cuts where the clock pauses or jumps back and "
-    "interpolates linearly in between"
+    "; use --resample auto (resample=True): it cuts the record where the clock pauses or jumps back, and "
+    "interpolates linearly between the cuts"
 )
 
 
 @dataclass(frozen=True)
 class Resampled:
-    """Pieces of one record on uniform grids."""
+    """Parts of one record on uniform grids."""
 
     pieces: list[Array]
-    """The columns of every piece, (samples, columns)."""
+    """The columns of every part, (samples, columns)."""
     rate: float
     """Sampling rate in Hz."""
     note: str
-    """What was done, in one sentence."""
+    """A description of the changes, in one sentence."""
 
 
 def uniform_rate(stamps: Array, source: str) -> float:
-    """Read the sampling rate from uniform time stamps.
+    """Return the sampling rate of uniform time stamps.
 
     Parameters
     ----------
     stamps
         Time of every sample in s.
     source
-        The file, for messages.
+        Name of the file, for messages.
 
     Returns
     -------
     float
-        The rate in Hz. Stamps are rounded numbers: a rate within one part in a million of a whole
-        number of hertz is that number.
+        The rate in Hz. Time stamps are rounded numbers. A rate that differs from an integer by less than one
+        part in a million is therefore rounded to this integer.
 
     Raises
     ------
     DataError
-        The stamps run backwards, have gaps, or are not uniform; the message names the row.
+        The time stamps run backwards, have gaps, or are not uniform. The message states the row.
 
     Examples
     --------
@@ -68,12 +68,12 @@ def uniform_rate(stamps: Array, source: str) -> float:
 
 
 def resample(stamps: Array, columns: Array, rate: float | None, source: str) -> Resampled:
-    """Put samples on a uniform grid.
+    """Interpolate samples to a uniform grid.
 
-    The record is cut where the clock jumps back and where it pauses for more than ten usual (median)
-    steps; every piece becomes an experiment of its own, on a grid that starts at its first stamp.
-    Within a piece, values are interpolated linearly; of samples with equal stamps the first is kept.
-    Nothing is filtered: a rate far below the record's own folds fast signals over.
+    The record is cut where the clock jumps back and where it pauses for more than ten median steps. Every
+    part becomes a separate experiment, on a grid that starts at its first time stamp. Within a part, values
+    are interpolated linearly. Of samples with equal time stamps, the first one is kept. The samples are not
+    filtered: if the new rate is far below the original rate, fast signals are aliased.
 
     Parameters
     ----------
@@ -82,19 +82,19 @@ def resample(stamps: Array, columns: Array, rate: float | None, source: str) -> 
     columns
         The samples, (samples, columns).
     rate
-        Rate of the grid in Hz; None takes one over the median step.
+        Rate of the grid in Hz; None takes the inverse of the median step.
     source
-        The file, for messages.
+        Name of the file, for messages.
 
     Returns
     -------
     Resampled
-        The pieces, the rate and a note of what was done.
+        The parts, the rate, and a note that describes the changes.
 
     Raises
     ------
     ParameterError
-        The rate is not positive, or more than a hundred times the record's own.
+        The rate is not positive, or is more than a hundred times the original rate.
     DataError
         No two stamps increase.
 
@@ -109,13 +109,13 @@ def resample(stamps: Array, columns: Array, rate: float | None, source: str) -> 
     forward = np.diff(stamps)
     forward = forward[forward > 0]
     if forward.size == 0:
-        raise DataError(f"{source}: no two of the {len(stamps)} time stamps increase; give the rate (--rate)")
+        raise DataError(f"{source}: the {len(stamps)} time stamps do not increase; give the rate (--rate)")
     usual = float(np.median(forward))
     rate = 1.0 / usual if rate is None else float(rate)
     if rate * usual > MOST_REFINED:
         raise ParameterError(
-            f"`resample` = {rate:g} Hz is more than {MOST_REFINED:g} times the record's own rate, "
-            f"{1 / usual:g} Hz; interpolation adds no information: ask for less"
+            f"`resample` = {rate:g} Hz is more than {MOST_REFINED:g} times the original rate, "
+            f"{1 / usual:g} Hz; interpolation adds no information: choose a lower rate"
         )
     whole = float(round(rate))
     rate = whole if whole and abs(rate - whole) <= 1e-3 * rate else rate
@@ -128,7 +128,7 @@ def resample(stamps: Array, columns: Array, rate: float | None, source: str) -> 
     edges = [0, *(np.flatnonzero(backward | gaps) + 1), len(stamps)]
     pieces, short = [], 0
     for begin, end in zip(edges[:-1], edges[1:], strict=True):
-        # Half a millionth of a step forgives the rounding of the last stamp.
+        # Half a millionth of a step is the tolerance for the rounding of the last time stamp.
         count = int(np.floor((stamps[end - 1] - stamps[begin]) * rate + 1 + 5e-7))
         if count < 2:
             short += int(end - begin)
@@ -138,7 +138,7 @@ def resample(stamps: Array, columns: Array, rate: float | None, source: str) -> 
             np.column_stack([np.interp(grid, stamps[begin:end], column[begin:end]) for column in columns.T])
         )
     if not pieces:
-        raise DataError(f"{source}: no piece of the record is longer than 1/{rate:g} s; give a higher rate")
+        raise DataError(f"{source}: no part of the record is longer than 1/{rate:g} s; give a higher rate")
     note = f"{source}: interpolated linearly to {rate:g} Hz"
     if len(pieces) > 1 or short:
         note += (
@@ -146,7 +146,7 @@ def resample(stamps: Array, columns: Array, rate: float | None, source: str) -> 
             f"{np.count_nonzero(backward)} backward jumps of the clock"
         )
     if repeated:
-        note += f"; {repeated} rows with a repeated time stamp left out"
+        note += f"; {repeated} rows with a repeated time stamp were removed"
     if short:
-        note += f"; {short} rows between two cuts left out"
+        note += f"; {short} rows between two cuts were removed"
     return Resampled(pieces, rate, note)

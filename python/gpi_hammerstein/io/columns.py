@@ -1,4 +1,4 @@
-"""What a column's header says: name, unit, and the part it plays."""
+"""Name, unit and role of a column, from its header."""
 
 import re
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from gpi_hammerstein._native import DataError
 
-# Seconds in one unit of a time column.
+# Seconds in each unit of a time column.
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 
 UNITS = frozenset(
@@ -18,29 +18,29 @@ UNITS = frozenset(
 TIME = re.compile(r"t|time|timestamp", re.IGNORECASE)
 INPUT = re.compile(r"(u|in|input)_?\d*", re.IGNORECASE)
 OUTPUT = re.compile(r"(y|out|output)_?\d*", re.IGNORECASE)
-# What actuators are driven by and what they do, where no column has one of the names above.
+# Names of the drive and of the motion, used if no column has one of the names above.
 DRIVE = re.compile(r"(voltage|drive|command)_?\d*", re.IGNORECASE)
 MOTION = re.compile(r"(position|displacement)_?\d*", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column's header and what it says."""
+    """A header of a column, with the name and the unit that it contains."""
 
     header: str
     name: str
     unit: str
     array: str
-    """Name of the array that the column was cut from; the header itself in a table."""
+    """Name of the array that contains the column; in a table, the header itself."""
 
     def matches(self, wanted: str) -> bool:
-        """Whether a user who writes `wanted` means this column."""
+        """Return whether the name `wanted` that a user gives means this column."""
         return wanted in (self.header, self.name, self.array)
 
 
 @dataclass(frozen=True)
 class Roles:
-    """The columns of a file, sorted by the part they play."""
+    """The columns of a file, by their roles."""
 
     time: Column | None = None
     inputs: list[Column] = field(default_factory=list)
@@ -48,7 +48,7 @@ class Roles:
     covariates: list[Column] = field(default_factory=list)
 
     def used(self) -> list[Column]:
-        """All columns that play a part."""
+        """Return all columns that have a role."""
         time = [self.time] if self.time else []
         return [*time, *self.inputs, *self.outputs, *self.covariates]
 
@@ -59,15 +59,15 @@ def parse_header(header: str, array: str | None = None) -> Column:
     Parameters
     ----------
     header
-        Such as ``y_um``, ``y [um]`` or ``y``. What follows the last underscore is the unit only if
-        it is the symbol of one.
+        The header, for example ``y_um``, ``y [um]`` or ``y``. The text after the last underscore is the unit
+        only if it is the symbol of a known unit.
     array
-        Name of the array that the column was cut from.
+        Name of the array that contains the column.
 
     Returns
     -------
     Column
-        Name and unit; the unit is empty when the header has none.
+        The name and the unit. The unit is empty if the header has none.
 
     Examples
     --------
@@ -98,30 +98,31 @@ def assign_roles(
     covariates: Sequence[str] | None = None,
     need_time: bool = True,
 ) -> Roles:
-    """Find which column is time, which are inputs, outputs and covariates.
+    """Determine which columns are time, inputs, outputs and covariates.
 
     Parameters
     ----------
     columns
         The columns of a file.
     source
-        The file, for messages.
+        Name of the file, for messages.
     time, inputs, outputs, covariates
-        Names given by the user, with or without unit. What is None is found by its usual name:
-        ``t`` or ``time``; ``u``, ``u1``, ``input``, else ``voltage``, ``drive``, ``command``; ``y``,
-        ``y1``, ``output``, else ``position``, ``displacement``; every other column is a covariate.
+        Names that the user gives, with or without unit. If a role is None, columns are recognised by the
+        usual names. Time: ``t`` or ``time``. Inputs: ``u``, ``u1``, ``input``, else ``voltage``, ``drive``,
+        ``command``. Outputs: ``y``, ``y1``, ``output``, else ``position``, ``displacement``. Every other
+        column is a covariate.
     need_time
-        False when the rate is known: a time column is then found but not needed.
+        False if the rate is known. A time column is then recognised but not required.
 
     Returns
     -------
     Roles
-        No output at all is allowed: such a record can be simulated.
+        The columns by role. A record without outputs is allowed, because it can be simulated.
 
     Raises
     ------
     DataError
-        A named column does not exist, no input is found, or one column has two parts.
+        A named column does not exist, no input is found, or one column has two roles.
 
     Examples
     --------
@@ -136,7 +137,7 @@ def assign_roles(
             matching = [column for column in columns if column.matches(name)]
             if not matching:
                 there = ", ".join(column.header for column in columns)
-                raise DataError(f"{source}: no column `{name}` (asked for as {option}); there are: {there}")
+                raise DataError(f"{source}: no column `{name}` (given as {option}); the columns are: {there}")
             found += matching
         return found
 
@@ -152,7 +153,7 @@ def assign_roles(
         given += chosen or []
     twice = sorted({column.header for column in given if given.count(column) > 1})
     if twice:
-        raise DataError(f"{source}: column `{twice[0]}` is given two parts; name it once")
+        raise DataError(f"{source}: column `{twice[0]}` is given two roles; name it only once")
 
     times = time_given or usual(TIME, given)[:1]
     if chosen_inputs is None:
@@ -171,7 +172,7 @@ def assign_roles(
         ]
         more = "".join(f", {what}" for what in others)
         raise DataError(
-            f"{source}: no input column; name one with input= (--input){more}. There are: {there}"
+            f"{source}: no input column; name one with input= (--input){more}. The columns are: {there}"
         )
     if not times and need_time:
         raise DataError(

@@ -1,4 +1,4 @@
-"""Data frames of Polars and pandas, and datasets of xarray, as tables."""
+"""Conversion of Polars and pandas data frames and xarray datasets to tables."""
 
 from typing import Any, TypeGuard
 
@@ -9,16 +9,16 @@ from gpi_hammerstein._native import DataError
 from gpi_hammerstein.io.tables import Table, from_frame
 
 Frame = Any
-"""A Polars or pandas data frame, or an xarray dataset; the latter two are no dependencies."""
+"""A Polars or pandas data frame, or an xarray dataset; pandas and xarray are not dependencies."""
 
 
 def is_frame(source: object) -> TypeGuard[Frame]:
-    """Whether it holds columns by name.
+    """Return whether an object is a data frame or dataset.
 
     Parameters
     ----------
     source
-        A path, a list of them, or a frame.
+        A path, a list of paths, or a frame.
 
     Examples
     --------
@@ -29,24 +29,24 @@ def is_frame(source: object) -> TypeGuard[Frame]:
 
 
 def read_frame(source: Frame) -> Table:
-    """Turn a frame into a table.
+    """Convert a frame to a table.
 
     Parameters
     ----------
     source
-        Columns named as those of a CSV file. An index that is no mere count, and the coordinate of an xarray
-        dataset, is a column too; times and time spans count in seconds from the first one on. Units that
-        xarray keeps in ``attrs["units"]`` are heeded.
+        A frame with columns that are named as in a CSV file. An index that is not only a row number is also a
+        column, and so is the coordinate of an xarray dataset. Dates and time spans are converted to seconds
+        since the first one. Units in ``attrs["units"]`` of xarray are used.
 
     Returns
     -------
     Table
-        The numbers as float64.
+        The columns, with numbers as float64.
 
     Raises
     ------
     DataError
-        No rows, or variables of more than one dimension.
+        There are no rows, or a variable has more than one dimension.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def read_frame(source: Frame) -> Table:
 
 
 def pandas_columns(frame: Frame) -> dict[str, Any]:
-    """Return the columns of a pandas frame, its index among them."""
+    """Return the columns of a pandas frame, including its index."""
     index, columns = frame.index, {}
     values = index.to_numpy()
     if values.dtype.kind in "Mm":
@@ -71,7 +71,7 @@ def pandas_columns(frame: Frame) -> dict[str, Any]:
 
 
 def dataset_columns(dataset: Frame) -> dict[str, Any]:
-    """Return the variables of an xarray dataset, its coordinate among them."""
+    """Return the variables of an xarray dataset, including its coordinate."""
     columns = {}
     for name, variable in {**dataset.coords, **dataset.data_vars}.items():
         if variable.ndim != 1:
@@ -87,10 +87,10 @@ def dataset_columns(dataset: Frame) -> dict[str, Any]:
 
 
 def in_seconds(values: Any) -> Any:
-    """Return times in seconds from the first one on."""
+    """Return times in seconds since the first one."""
     return (values - values[0]) / np.timedelta64(1, "s")
 
 
 def plain(values: Any) -> Any:
-    """Return numbers as an array, objects as a list of text."""
+    """Return numbers as an array, and other objects as a list of text."""
     return values if values.dtype.kind in "fiub" else [None if v is None else str(v) for v in values]

@@ -1,4 +1,4 @@
-"""Where the names stand in a text file, and what stands above and below them."""
+"""The header of a text file: column names, units, and the text above them."""
 
 import csv
 import re
@@ -7,52 +7,53 @@ from dataclasses import dataclass
 
 from gpi_hammerstein.io.columns import UNITS
 
-# A number as it is written where the comma is the decimal mark; whole numbers have none.
+# A number with a decimal comma, or an integer.
 DECIMAL_COMMA = r"(?i)^[+-]?(\d*(,\d*)?(e[+-]?\d+)?|nan|inf)$"
 
-# What recorders write above the names is a screenful at most.
+# Largest number of lines in which the header is searched.
 DEEPEST = 200
 
 
 @dataclass(frozen=True)
 class Header:
-    """The names of the columns, and the text below them."""
+    """The names of the columns, and the rows below them."""
 
     names: list[str]
     separator: str
     rows: str
     notes: list[str]
-    """What was left out or put together."""
+    """Descriptions of the lines that were skipped."""
 
 
 def find_header(text: str) -> Header | None:
-    r"""Find the names: the last line of as many cells as the first row of numbers, above it.
+    r"""Find the line of the column names.
 
-    A line of units between the names and the numbers is put behind the names, as in ``u [V]``; what stands
-    above the names is left out. Lines that start with ``#`` and empty ones count as not there.
+    This is the last line above the first row of numbers that has the same number of cells. If there is a line
+    of units between the names and the numbers, each unit is appended to its name, as in ``u [V]``. Lines
+    above the names are skipped. Empty lines and lines that start with ``#`` are ignored.
 
     Parameters
     ----------
     text
-        Comma, semicolon or tab separated.
+        The text of the file, separated by commas, semicolons or tabs.
 
     Returns
     -------
     Header
-        Names, possibly numbers where the file has none; None for a file without text.
+        The names; they are numbers if the file has no names. None for a file without text.
 
     Examples
     --------
     >>> found = find_header("Scope 3\ntime,drive\ns,V\n0,1.5\n")
     >>> found.names, found.rows, found.notes
-    (['time [s]', 'drive [V]'], '0,1.5', ['1 line above the names is left out, first `Scope 3`'])
+    (['time [s]', 'drive [V]'], '0,1.5', ['skipped 1 line above the names, first `Scope 3`'])
     """
     *head, rest = f"{text}\n".split("\n", DEEPEST)
     lines = [line.rstrip("\r") for line in head if line.strip() and not line.startswith("#")]
     if not lines:
         return None
     found = _first_numbers(lines)
-    # without a row of numbers, or with text where names would be, what is wrong shows below the first line
+    # without a row of numbers, take the first line as names: the error is then found in the rows below
     place, separator = found or (1, max(",;\t", key=lines[0].count))
     width = len(_cells(lines[place], separator)) if place < len(lines) else 0
     above = [_cells(line, separator) for line in lines[:place]]
@@ -70,13 +71,13 @@ def find_header(text: str) -> Header | None:
     below = lines[names + (2 if units else 1) :]
     notes = []
     if names > 0:
-        what = "1 line above the names is" if names == 1 else f"{names} lines above the names are"
-        notes.append(f"{what} left out, first `{lines[0].strip()[:60]}`")
+        what = "1 line" if names == 1 else f"{names} lines"
+        notes.append(f"skipped {what} above the names, first `{lines[0].strip()[:60]}`")
     return Header(headers, separator, "\n".join([*below, rest]).strip("\r\n"), notes)
 
 
 def _first_numbers(lines: Sequence[str]) -> tuple[int, str] | None:
-    """Find the first line of two numbers or more, and what separates them."""
+    """Find the first line with two or more numbers, and their separator."""
     for place, line in enumerate(lines):
         for separator in ",;\t":
             cells = _cells(line, separator)
@@ -90,7 +91,7 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell holds a number, with a decimal point or a decimal comma."""
+    """Return whether a cell contains a number, with a decimal point or a decimal comma."""
     try:
         float(cell)
     except ValueError:

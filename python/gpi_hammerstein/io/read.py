@@ -1,4 +1,4 @@
-"""Records from files."""
+"""Reading of records from files."""
 
 import os
 from collections.abc import Sequence
@@ -38,32 +38,34 @@ def read_record(
     Parameters
     ----------
     path
-        A file, or a list of files with the same columns, whose experiments are put in one record:
-        CSV (``.csv``, ``.csv.gz``, also semicolon or tab separated), Parquet (``.parquet``), NumPy
-        (``.npz``, ``.npy``), MATLAB v5 or v7.3 (``.mat``). Arrays in the last two are (samples,),
-        (samples, channels), (samples, channels, realisations) or (samples, channels, realisations,
-        periods): every realisation is an experiment whose periods but the last are warm-up. Or a data
-        frame of Polars or pandas, or an xarray dataset, with columns named as in a CSV file.
+        A file, or a list of files with the same columns, whose experiments are put in one record. Formats are
+        CSV (``.csv``, ``.csv.gz``, also separated by semicolons or tabs), Parquet (``.parquet``), NumPy
+        (``.npz``, ``.npy``) and MATLAB v5 or v7.3 (``.mat``). Arrays in NumPy and MATLAB files have the shape
+        (samples,), (samples, channels), (samples, channels, realisations) or (samples, channels,
+        realisations, periods). Every realisation is an experiment; all of its periods except the last one are
+        warm-up. A Polars or pandas data frame or an xarray dataset, with columns named as in a CSV file, is
+        also accepted.
     input, output, covariate
-        Names of the columns with or without their unit: ``"u_V"`` or ``"u"``. What is not given is
-        found: inputs ``u``, ``u1``, ``input``, else ``voltage``, ``drive``, ``command``; outputs ``y``,
-        ``y1``, ``output``, else ``position``, ``displacement``; every other column is a covariate
-        (``covariate=[]`` leaves them out). For ``.npy`` files, which hold the input alone, `output` is
-        the path of the file that holds the output, one for each of them.
+        Names of the columns with or without their unit: ``"u_V"`` or ``"u"``. If they are not given, columns
+        are recognised by their names. Inputs: ``u``, ``u1``, ``input``, else ``voltage``, ``drive``,
+        ``command``. Outputs: ``y``, ``y1``, ``output``, else ``position``, ``displacement``. Every other
+        column is a covariate (``covariate=[]`` ignores them). A ``.npy`` file contains only the input;
+        `output` is then the path of the file with the output. For several ``.npy`` files, give one output
+        file for each of them.
     time
-        Name of the time column; ``t`` and ``time`` are found. The unit after its last underscore is
-        heeded (``t_ms``), s when there is none.
+        Name of the time column; ``t`` and ``time`` are recognised. The unit is the text after the last
+        underscore (``t_ms``); without a unit, it is s.
     rate
-        Sampling rate in Hz; takes the place of the time column.
+        Sampling rate in Hz; it replaces the time column.
     warmup
-        Samples at the start of every experiment that drive the model but are not scored; None is 0, or
-        what the periods of an array say.
+        Number of samples at the start of every experiment that drive the model but are not scored. None takes
+        0, or the number that follows from the periods of an array.
     resample
-        A rate in Hz, or True (or ``"auto"``) for that of the usual step: makes non-uniform sampling
-        uniform by linear interpolation, and cuts the record into several experiments at gaps and where
-        the clock jumps back.
+        A rate in Hz, or True (or ``"auto"``) for the rate of the median step. Makes non-uniform sampling
+        uniform by linear interpolation, and cuts the record into several experiments at gaps and where the
+        clock jumps back.
     experiment
-        Experiments to keep, counted from 0: ``3``, ``[0, 2]``, ``"0-4,7"``.
+        Experiments to keep, numbered from 0: ``3``, ``[0, 2]``, ``"0-4,7"``.
 
     Returns
     -------
@@ -75,9 +77,9 @@ def read_record(
     ParameterError
         An option contradicts the file or is out of range.
     DataError
-        The file is missing, empty or holds text, NaN or infinite samples; columns are missing or of
-        unequal length; time stamps have gaps, run backwards or are not uniform. The message names the
-        column and the rows, which count from 0.
+        The file is missing, is empty, or contains text, NaN or infinite samples; columns are missing or have
+        different lengths; time stamps have gaps, run backwards or are not uniform. The message states the
+        column and the rows, which are counted from 0.
 
     Examples
     --------
@@ -111,7 +113,7 @@ def read_recording(
     resample: bool | float | str | None = None,
     experiment: str | int | Sequence[int] | None = None,
 ) -> Recording:
-    """Read like :func:`read_record`, but without asking for an output column.
+    """Read like :func:`read_record`, but do not require an output column.
 
     Parameters
     ----------
@@ -121,7 +123,7 @@ def read_recording(
     Returns
     -------
     Recording
-        The experiments, and notes of what was done to the samples.
+        The experiments, and notes on changes of the samples.
 
     Raises
     ------
@@ -136,13 +138,15 @@ def read_recording(
     if rate is not None and not rate > 0:
         raise ParameterError(f"`rate` = {rate}: the sampling rate in Hz must be positive")
     if rate is not None and resample:
-        raise ParameterError("`rate` and `resample` exclude each other: resampling needs the time stamps")
+        raise ParameterError(
+            "`rate` and `resample` exclude each other, because resampling needs the time stamps"
+        )
     if warmup is not None and warmup < 0:
-        raise ParameterError(f"`warmup` = {warmup}: must be zero or a number of samples")
+        raise ParameterError(f"`warmup` = {warmup}: must be a number of samples, zero or larger")
     given: list[Any] = [path] if is_frame(path) or isinstance(path, str | os.PathLike) else [*path]
     sources = [one if is_frame(one) else Path(one) for one in given]
     if not sources:
-        raise ParameterError("`path`: no file is named; name at least one record")
+        raise ParameterError("`path`: no file is given; give at least one record")
     output_files = _output_files([one for one in sources if isinstance(one, Path)], _names(output))
     parts = []
     for one in sources:
@@ -175,7 +179,7 @@ def _names(names: Names | None) -> list[str] | None:
 def _read_tables(path: Path) -> list[Table]:
     suffixes = [suffix.lower() for suffix in path.suffixes]
     if not path.exists():
-        raise DataError(f"{path}: no such file; name a record")
+        raise DataError(f"{path}: no such file; give a record file")
     if suffixes[-1:] == [".parquet"]:
         return [read_parquet(path)]
     if suffixes[-1:] == [".npz"]:
@@ -185,33 +189,34 @@ def _read_tables(path: Path) -> list[Table]:
     if suffixes[-1:] in ([".csv"], [".tsv"], [".txt"], [".dat"]) or suffixes[-1:] == [".gz"]:
         return [read_csv(path)]
     raise DataError(
-        f"{path}: the name says no known format; records end in .csv, .csv.gz, .parquet, .npz, .npy or .mat"
+        f"{path}: no known format; names of record files end in .csv, .csv.gz, .parquet, .npz, .npy or .mat"
     )
 
 
 def _output_files(paths: Sequence[Path], outputs: list[str] | None) -> dict[Path, Path | None]:
-    """Find the .npy file of the output for each .npy file of the input; empty for other records."""
+    """Return the .npy file of the output for each .npy file of the input; empty for other formats."""
     if not any(path.suffix == ".npy" for path in paths):
         return {}
     other = next((path for path in paths if path.suffix != ".npy"), None)
     if other is not None:
         raise ParameterError(
-            f"`path`: {other} beside .npy files; these hold one signal each and are named apart"
+            f"`path`: {other} together with .npy files; read .npy files separately, because each "
+            "of them contains only one signal"
         )
     for path in paths:
         if not path.exists():
-            raise DataError(f"{path}: no such file; name a record")
+            raise DataError(f"{path}: no such file; give a record file")
     if outputs is None:
         return dict.fromkeys(paths)
     if len(outputs) != len(paths):
         raise ParameterError(
-            f"`output` names {len(outputs)} files, but {len(paths)} .npy files of inputs are named; "
-            "name the .npy file of the output for each of them, in the same order"
+            f"`output` names {len(outputs)} files, but {len(paths)} .npy files of inputs are given; "
+            "give one .npy file of the output for each of them, in the same order"
         )
     files: dict[Path, Path | None] = {}
     for path, name in zip(paths, outputs, strict=True):
         file = Path(name)
-        # A bare file name means the folder of the input when there is no such file here.
+        # A file name without folder is also searched in the folder of the input.
         if not file.exists() and (path.parent / file).exists():
             file = path.parent / file
         if not file.exists():
@@ -225,7 +230,7 @@ def _output_files(paths: Sequence[Path], outputs: list[str] | None) -> dict[Path
 def _read_part(
     table: Table, roles: Roles, rate: float | None, resample: bool | float | str | None, warmup: int | None
 ) -> Recording:
-    """Cut one table into experiments."""
+    """Divide one table into experiments."""
     signals = [*roles.inputs, *roles.outputs, *roles.covariates]
     table.require_numbers(signals)
     samples = table.stack(signals)
@@ -236,7 +241,9 @@ def _read_part(
         stamps = table.columns[roles.time] * TIME_UNITS.get(roles.time.unit, 1.0)
         if resample:
             if isinstance(resample, str) and resample != "auto":
-                raise ParameterError(f"`resample` = {resample}: a rate in Hz, or `auto` for the usual step")
+                raise ParameterError(
+                    f"`resample` = {resample}: must be a rate in Hz, or `auto` for that of the median step"
+                )
             asked = None if isinstance(resample, bool | str) else float(resample)
             found = put_on_grid(stamps, samples, asked, table.source)
             pieces, given = found.pieces, found.rate
@@ -246,14 +253,14 @@ def _read_part(
             given, starts = uniform_rate(stamps, table.source), [float(stamps[0])]
             if not roles.time.unit and (stamps == np.rint(stamps)).all():
                 notes.append(
-                    f"`{roles.time.header}` counts in whole numbers and names no unit: taken as seconds, "
-                    f"{given:g} Hz; where it counts samples, give the rate in Hz (--rate)"
+                    f"`{roles.time.header}` contains only integers and has no unit: taken as seconds, "
+                    f"{given:g} Hz; if it counts samples, give the rate in Hz (--rate)"
                 )
     elif resample:
         raise ParameterError(
-            f"`resample`: {table.source} has no time stamps to resample by; give the rate (--rate)"
+            f"`resample`: {table.source} has no time stamps, which resampling needs; give the rate (--rate)"
         )
-    assert given is not None  # assign_roles asks for a time column otherwise
+    assert given is not None  # assign_roles requires a time column otherwise
     inputs, outputs = len(roles.inputs), len(roles.outputs)
     start_of_covariates = inputs + outputs
     runs = [
@@ -287,7 +294,7 @@ def _join(parts: Sequence[Recording], sources: Sequence[str]) -> Recording:
             if _labels(ours) != _labels(theirs):
                 raise DataError(
                     f"{where}: {what} differ: {', '.join(_labels(ours)) or 'none'} and "
-                    f"{', '.join(_labels(theirs)) or 'none'}; name the columns that both have"
+                    f"{', '.join(_labels(theirs)) or 'none'}; name columns that both files have"
                 )
         runs += part.runs
         notes += part.notes

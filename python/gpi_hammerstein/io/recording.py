@@ -1,4 +1,4 @@
-"""What a file holds, before it is known whether it has an output."""
+"""The content of a record file, with or without an output."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,7 +19,7 @@ class Run:
     u: Array
     """(samples, inputs)"""
     y: Array
-    """(samples, outputs); no columns when the output was not measured"""
+    """(samples, outputs); without columns if the output was not measured"""
     covariates: Array
     """(samples, covariates)"""
     warmup: int = 0
@@ -38,10 +38,10 @@ class Recording:
     outputs: list[Column]
     covariates: list[Column]
     notes: list[str] = field(default_factory=list)
-    """What was done to the samples on the way in."""
+    """Notes on changes of the samples while they were read."""
 
     def record(self) -> Record:
-        """Make the record that identification needs.
+        """Return the record for the identification.
 
         Raises
         ------
@@ -70,12 +70,12 @@ class Recording:
         Parameters
         ----------
         experiments
-            Numbers from 0: ``3``, ``[0, 2]``, ``"0-4,7"``; None keeps all.
+            Their numbers, starting at 0: ``3``, ``[0, 2]``, ``"0-4,7"``; None keeps all.
 
         Raises
         ------
         ParameterError
-            A number that the record does not have.
+            The record has no experiment of this number.
         """
         if experiments is None:
             return self
@@ -83,18 +83,18 @@ class Recording:
         missing = [index for index in chosen if index >= len(self.runs)]
         if missing:
             raise ParameterError(
-                f"`experiments`: number {missing[0]} is asked for, but the record has {len(self.runs)}, "
+                f"`experiments`: number {missing[0]} is requested, but the record has {len(self.runs)}, "
                 f"numbered from 0 to {len(self.runs) - 1}"
             )
         return replace(self, runs=[self.runs[index] for index in chosen])
 
     def without(self, experiments: str | int | Sequence[int]) -> "Recording":
-        """Keep all experiments but these."""
+        """Keep all experiments except these."""
         left_out = set(parse_experiments(experiments))
         kept = [index for index in range(len(self.runs)) if index not in left_out]
         if not kept:
             raise ParameterError(
-                f"`experiments`: all {len(self.runs)} experiments are held out; leave one to fit on"
+                f"`experiments`: all {len(self.runs)} experiments are held out; keep at least one for the fit"
             )
         return self.select(kept)
 
@@ -103,17 +103,17 @@ class Recording:
         return replace(self, runs=[change(run) for run in self.runs])
 
     def skip(self, seconds: float) -> "Recording":
-        """Leave the first seconds of every experiment out of the score, as a run-in.
+        """Do not score the first seconds of every experiment.
 
         Raises
         ------
         ParameterError
-            A negative time.
+            The time is negative.
         DataError
-            Nothing is left to score.
+            No samples remain to be scored.
         """
         if not seconds >= 0:
-            raise ParameterError(f"`skip` = {seconds}: must be zero or a time in s")
+            raise ParameterError(f"`skip` = {seconds}: must be a time in s, zero or larger")
         samples = round(seconds * self.rate)
 
         def later(run: Run) -> Run:
@@ -128,19 +128,19 @@ class Recording:
 
 
 def raise_warmup(record: Record, warmup: Sequence[int]) -> Record:
-    """Leave at least the first `warmup` samples of every experiment out of the score.
+    """Do not score at least the first `warmup` samples of every experiment.
 
     Parameters
     ----------
     record
-        Any record.
+        The record.
     warmup
-        Samples at the start of each experiment; smaller than the record's own changes nothing.
+        Number of samples at the start of each experiment. A number below that of the record has no effect.
 
     Returns
     -------
     Record
-        The same samples, scored later.
+        The same samples, with a larger warm-up.
 
     Examples
     --------
@@ -164,22 +164,23 @@ def raise_warmup(record: Record, warmup: Sequence[int]) -> Record:
 
 
 def parse_experiments(experiments: str | int | Sequence[int]) -> list[int]:
-    """Read a choice of experiments such as ``"0-4,7"``.
+    """Parse a selection of experiments, for example ``"0-4,7"``.
 
     Parameters
     ----------
     experiments
-        A number, numbers, or text of numbers and ranges, counted from 0; ranges include their end.
+        A number, several numbers, or a text of numbers and ranges. Numbers start at 0; ranges include their
+        end.
 
     Returns
     -------
     list of int
-        The numbers in the order given.
+        The numbers, in the given order.
 
     Raises
     ------
     ParameterError
-        The text cannot be read, or a number is negative.
+        The text cannot be parsed, or a number is negative.
 
     Examples
     --------
@@ -193,12 +194,12 @@ def parse_experiments(experiments: str | int | Sequence[int]) -> list[int]:
         for part in experiments.split(","):
             first, dash, last = part.strip().partition("-")
             if not first.isdecimal() or (dash and not last.isdecimal()):
-                raise ParameterError(f"`experiments` = {experiments}: write numbers from 0 such as `0-4,7`")
+                raise ParameterError(f"`experiments` = {experiments}: give numbers from 0, such as `0-4,7`")
             numbers += range(int(first), int(last if dash else first) + 1)
     else:
         numbers = [int(number) for number in experiments]
     if not numbers or min(numbers) < 0:
         raise ParameterError(
-            f"`experiments` = {experiments}: names none; write numbers from 0 such as `0-4,7`"
+            f"`experiments` = {experiments}: selects no experiment; give numbers from 0, such as `0-4,7`"
         )
     return numbers

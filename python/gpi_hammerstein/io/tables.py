@@ -1,4 +1,4 @@
-"""Columns of numbers from CSV and Parquet files."""
+"""Reading of CSV and Parquet files."""
 
 import io
 from collections.abc import Sequence
@@ -18,73 +18,73 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of equal length, the samples of one experiment."""
+    """Columns of equal length: the samples of one experiment."""
 
     source: str
     columns: dict[Column, Array]
     text: dict[Column, tuple[int, str]]
-    """Columns that hold text: the first such row and what stands there."""
+    """Columns that contain text: the first row with text, and this text."""
     rate: float | None = None
-    """The sampling rate in Hz, when the file states it."""
+    """The sampling rate in Hz, if the file contains it."""
     warmup: int = 0
-    """Samples at the start that are a run-in."""
+    """Number of samples at the start that are warm-up."""
     notes: list[str] = field(default_factory=list)
-    """What was done to the file's text."""
+    """Notes on lines of the file that were skipped."""
 
     def headers(self) -> list[Column]:
-        """All columns."""
+        """Return all columns."""
         return [*self.columns, *self.text]
 
     def require_numbers(self, columns: Sequence[Column]) -> None:
-        """Refuse text, NaN and infinite samples in `columns`.
+        """Reject text, NaN and infinite samples in `columns`.
 
         Raises
         ------
         DataError
-            Names the column and the rows, which count from 0.
+            The message states the column and the rows, which are counted from 0.
         """
         for column in columns:
             if column in self.text:
                 row, cell = self.text[column]
                 raise DataError(
                     f"{self.source}: column `{column.header}` holds text, first `{cell}` in row {row} "
-                    "(the rows below the names count from 0); repair or remove such rows, or leave the "
-                    "column out where it is no input, output or time (covariate=[], --covariate none)"
+                    "(the rows below the names are counted from 0); correct or remove such rows; if the "
+                    "column is no input, output or time, ignore it (covariate=[], --covariate none)"
                 )
             rows = np.flatnonzero(~np.isfinite(self.columns[column]))
             if rows.size:
                 shown = ", ".join(map(str, rows[:5])) + (", .." if rows.size > 5 else "")
                 raise DataError(
                     f"{self.source}: column `{column.header}` has {rows.size} NaN, infinite or empty "
-                    f"samples, in rows {shown} (counted from 0 below the names); repair these rows, or cut "
-                    "them out and read the rest with --resample auto (resample=True)"
+                    f"samples, in rows {shown} (counted from 0 below the names); correct these rows, or "
+                    "remove them and read the rest with --resample auto (resample=True)"
                 )
 
     def stack(self, columns: Sequence[Column]) -> Array:
-        """Columns side by side, (samples, columns)."""
+        """Return the columns as one array, (samples, columns)."""
         rows = len(next(iter(self.columns.values())))
         return np.column_stack([np.empty((rows, 0)), *(self.columns[column] for column in columns)])
 
 
 def read_csv(path: Path) -> Table:
-    """Read a CSV file, gzipped or not.
+    """Read a CSV file, which may be compressed with gzip.
 
     Parameters
     ----------
     path
-        Comma, semicolon or tab separated, in UTF-8 or Latin-1. The names are the last line above the
-        numbers, or the last but one above a line of units; what stands above them, and lines that start
-        with ``#``, are left out. Where the separator is no comma, numbers may have a decimal comma.
+        The file, separated by commas, semicolons or tabs, in UTF-8 or Latin-1. The names are the last line
+        above the numbers, or the line above a line of units. Lines above the names and lines that start with
+        ``#`` are skipped. If the separator is not a comma, numbers may have a decimal comma.
 
     Returns
     -------
     Table
-        Empty cells are NaN.
+        The columns. Empty cells are NaN.
 
     Raises
     ------
     DataError
-        The file is empty, has no header, or its rows have more cells than its header.
+        The file is empty, has no header, or has rows with more cells than the header.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def read_csv(path: Path) -> Table:
         raise DataError(f"{path}: not a text file; a CSV record is text, in UTF-8 or Latin-1") from None
     header = find_header(text)
     if header is None:
-        raise DataError(f"{path}: the file is empty; a record has a header line and one row a sample")
+        raise DataError(f"{path}: the file is empty; a record has a header line and one row for each sample")
     names = header.names
     if all(map(is_number, names)):
         first = header.separator.join(names)[:60]
@@ -114,7 +114,7 @@ def read_csv(path: Path) -> Table:
     if not header.rows:
         raise DataError(
             f"{path}: no rows below the header line `{header.separator.join(names)[:60]}`; a record has one "
-            "row a sample"
+            "row for each sample"
         )
     try:
         frame = pl.read_csv(
@@ -136,17 +136,17 @@ def read_parquet(path: Path) -> Table:
     Parameters
     ----------
     path
-        Columns of numbers with names such as ``t_s``, ``u_V``, ``y_um``.
+        The file, with columns of numbers and names such as ``t_s``, ``u_V``, ``y_um``.
 
     Returns
     -------
     Table
-        Nulls are NaN.
+        The columns. Null values are NaN.
 
     Raises
     ------
     DataError
-        The file is empty or no Parquet file.
+        The file is empty or is not a Parquet file.
 
     Examples
     --------
@@ -162,19 +162,19 @@ def read_parquet(path: Path) -> Table:
 
 
 def from_frame(frame: pl.DataFrame, source: str) -> Table:
-    """Turn a data frame into a table; cells that are no numbers make their column a text column.
+    """Convert a data frame to a table. A column with cells that are not numbers is a text column.
 
     Parameters
     ----------
     frame
-        Columns of numbers or of text that reads as numbers.
+        Columns of numbers, or of text that can be converted to numbers.
     source
-        The file, for messages.
+        Name of the file, for messages.
 
     Returns
     -------
     Table
-        The numbers as float64.
+        The columns, with numbers as float64.
 
     Raises
     ------
@@ -187,7 +187,9 @@ def from_frame(frame: pl.DataFrame, source: str) -> Table:
     {Column(header='u_V', name='u', unit='V', array='u_V'): (1, 'x')}
     """
     if frame.height == 0:
-        raise DataError(f"{source}: the file is empty: a header without rows; a record has one row a sample")
+        raise DataError(
+            f"{source}: the file is empty: a header without rows; a record has one row for each sample"
+        )
     columns: dict[Column, Array] = {}
     text: dict[Column, tuple[int, str]] = {}
     for series in frame:
@@ -195,7 +197,7 @@ def from_frame(frame: pl.DataFrame, source: str) -> Table:
         if series.dtype == pl.String:
             cells = series.str.strip_chars()
             cells = cells.set(cells == "", None)
-            # commas within a cell are decimal ones: the other separators come with them
+            # a comma within a cell is a decimal comma, because the separator is then another character
             if cells.str.contains(DECIMAL_COMMA).fill_null(True).all():
                 cells = cells.str.replace(",", ".", literal=True)
             numbers = cells.cast(pl.Float64, strict=False)
@@ -213,7 +215,7 @@ def from_frame(frame: pl.DataFrame, source: str) -> Table:
 
 
 def decoded(data: bytes) -> str:
-    """Return the text of a file: UTF-8, else Latin-1, which recorders of Western Europe write."""
+    """Return the text of a file, in UTF-8 or else in Latin-1, which some data loggers write."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

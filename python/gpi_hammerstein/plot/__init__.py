@@ -1,8 +1,8 @@
-"""Pictures of stages and results, on Matplotlib axes.
+"""Pictures of records, models and results, on Matplotlib axes.
 
-Every function draws on the axes it is given and returns them. Without axes it makes a figure with
-`matplotlib.pyplot.subplots`, which the caller shows, saves or closes. Bands are 1.96 standard deviations
-to each side, 95 % where the errors are normal.
+Every function draws on the given axes and returns them. Without axes, it creates a figure with
+`matplotlib.pyplot.subplots`; the caller shows, saves or closes this figure. Bands extend 1.96 standard
+deviations to each side; they are 95 % bands if the errors have a normal distribution.
 """
 
 from gpi_hammerstein.plot.compensation import compensation

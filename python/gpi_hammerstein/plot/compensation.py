@@ -1,4 +1,4 @@
-"""What a drive makes of a reference."""
+"""Picture of a compensated drive."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,12 +8,14 @@ from gpi_hammerstein.plot.style import BLUE, VERMILION, axes, label
 
 
 def compensation(found: Compensation, ax: Axes | None = None) -> Axes:
-    """Draw the output over the reference: a loop for a drive in proportion, a line for the one found.
+    """Draw the predicted output over the reference, for a proportional drive and for the compensated drive.
+
+    A proportional drive shows the hysteresis loop. For a perfect compensation, the curve is a straight line.
 
     Parameters
     ----------
     found
-        What ``model.compensate`` returned; the first output is drawn.
+        The result of ``model.compensate``. The first output is drawn.
     ax
         Axes to draw on.
 
@@ -37,13 +39,13 @@ def compensation(found: Compensation, ax: Axes | None = None) -> Axes:
 
     reference = first(found.reference)
     for signal, error, color, what in (
-        (found.in_proportion, found.error_in_proportion, BLUE, "drive in proportion"),
+        (found.in_proportion, found.error_in_proportion, BLUE, "proportional drive"),
         (found.predicted, found.error, VERMILION, "compensated drive"),
     ):
         fit = f"{what}, {100 * error['nrmse']:.2g} % rms"
         ax.plot(reference, first(signal), color=color, lw=0.9, label=fit)
     ax.set_xlabel(label(f"reference for {found.output_names[0]}", found.output_units[0]))
     ax.set_ylabel(label(f"predicted {found.output_names[0]}", found.output_units[0]))
-    ax.set_title("What the drive makes of the reference")
+    ax.set_title("Predicted output over the reference")
     ax.legend(loc="upper left")
     return ax

@@ -1,4 +1,4 @@
-"""Before and after: what an explanation made of the loop."""
+"""Picture of the hysteresis loop before and after an explanation."""
 
 from matplotlib.axes import Axes
 
@@ -10,16 +10,16 @@ from gpi_hammerstein.plot.style import BLACK, ORANGE, VERMILION, axes, label
 def loops(
     found: Explanation, ax: Axes | None = None, *, experiment: int = 0, input: int = 0, output: int = 0
 ) -> Axes:
-    """Draw the measured output against the input, with both models' outputs, where they are scored.
+    """Draw the measured output and the outputs of both models over the input, for all scored samples.
 
     Parameters
     ----------
     found
-        What `explain` returned.
+        The result of `explain`.
     ax
         Axes to draw on.
     experiment, input, output
-        Which one to draw, counted from 0.
+        The numbers of the experiment, the input and the output to draw, counted from 0.
 
     Returns
     -------
@@ -34,7 +34,7 @@ def loops(
     >>> ax = gpi.plot.loops(found)
     """
     ax = axes(ax, 5.0, 5.0)
-    # Before the plays have forgotten an unknown past the models are somewhere else.
+    # The first samples of the models depend on the unknown initial state and are not drawn.
     record = raise_warmup(found.record, found.warmups)
     scored = slice(record.warmup[experiment], None)
     u, y = record.u[experiment][scored, input], record.y[experiment][scored, output]
@@ -52,5 +52,5 @@ def loops(
 
 
 def title(found: Explanation) -> str:
-    """Return what was added, in a few words."""
+    """Return a title that lists the added effects."""
     return f"Added: {', '.join(found.effects)}" if found.effects else "No effect added"

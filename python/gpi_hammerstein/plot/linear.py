@@ -1,4 +1,4 @@
-"""Linear dynamics: impulse response, frequency response, singular values."""
+"""Pictures of linear dynamics: impulse response, frequency response, singular values."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,7 +8,7 @@ from gpi_hammerstein._native import Fir, Model, ParameterError, Refinement, Stat
 from gpi_hammerstein.plot.style import BLACK, BLUE, VERMILION, axes, line_style, say_nothing_to_draw, shade
 
 DECIBELS = 20 / np.log(10)
-# What is left of the slowest pole at the end of a model's impulse response, and how many taps may be drawn.
+# Decay of the slowest pole at the end of a drawn impulse response, and limits of the number of taps.
 SETTLED, FEWEST_TAPS, MOST_TAPS = 0.01, 20, 400
 
 
@@ -18,15 +18,15 @@ def markov(response: Fir | Model, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     response
-        Result of :func:`gpi_hammerstein.fir`; or a model, whose G is drawn until it has settled, with its
-        band where the model knows how sure it is.
+        The result of :func:`gpi_hammerstein.fir`, or a model. G of a model is drawn until it has settled,
+        with a 95 % band if the model has a refinement.
     ax
         Axes to draw on.
 
     Returns
     -------
     Axes
-        The axes; one line a pair of output and input.
+        The axes, with one line for each pair of output and input.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def markov(response: Fir | Model, ax: Axes | None = None) -> Axes:
 
 
 def settling_taps(sys: StateSpace) -> int:
-    """Return how many Markov parameters show a system until it has settled."""
+    """Return the number of Markov parameters until a system has settled."""
     radius = min(sys.spectral_radius, 1.0)
     if radius >= SETTLED ** (1 / MOST_TAPS):
         return MOST_TAPS
@@ -85,18 +85,18 @@ def bode(
     *,
     refinement: Refinement | None = None,
 ) -> Axes:
-    """Draw the magnitude of the frequency response, and the phase of a single-channel system.
+    """Draw the magnitude of the frequency response, and also the phase if the system has a single channel.
 
     Parameters
     ----------
     sys
         A discrete-time system.
     rate
-        Sampling rate in Hz; without it the axis is in rad per sample.
+        Sampling rate in Hz. Without it, the frequency axis is in rad per sample.
     ax
-        Axes for the magnitude; the phase gets an axis at the right.
+        Axes for the magnitude. The phase has its own axis on the right.
     refinement
-        The refinement of the model that the system belongs to; shades the bands.
+        The refinement of the model that contains the system. If it is given, bands are shaded.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def bode(
     Raises
     ------
     ParameterError
-        The refinement is that of a system with other channels.
+        The refinement belongs to a system with other numbers of inputs or outputs.
 
     Examples
     --------
@@ -142,7 +142,7 @@ def bode(
         right.set_ylabel("phase [deg] (dashed)")
     bottom, top = ax.get_ylim()
     if top - bottom < 1e-3:
-        # A pure delay: rounding errors are not worth the whole axis.
+        # The magnitude of a pure delay is constant: rounding errors must not fill the axis.
         ax.set_ylim(bottom - 1.0, top + 1.0)
     ax.set_xlabel("frequency [rad/sample]" if rate is None else "frequency [Hz]")
     ax.set(ylabel="magnitude [dB]", title=f"Frequency response, order {sys.order}")
@@ -156,12 +156,12 @@ def singular_values(sys: StateSpace, ax: Axes | None = None, *, values: ArrayLik
     Parameters
     ----------
     sys
-        Result of :func:`gpi_hammerstein.era`; other systems have no singular values.
+        The result of :func:`gpi_hammerstein.era`. Other systems have no singular values.
     ax
         Axes to draw on.
     values
-        Singular values to draw instead, shape (n,), descending, such as those of a model's identification;
-        drawn as a ratio to the first one.
+        Singular values to draw instead, shape (n,), in descending order, for example those of the
+        identification of a model. They are drawn as a ratio to the first one.
 
     Returns
     -------
@@ -176,7 +176,7 @@ def singular_values(sys: StateSpace, ax: Axes | None = None, *, values: ArrayLik
     own = sys.singular_values if values is None else values
     shown = np.zeros(0) if own is None else np.ravel(own)
     if len(shown) == 0 or shown[0] <= 0:
-        say_nothing_to_draw(ax, "no singular values: not realised from Markov parameters")
+        say_nothing_to_draw(ax, "no singular values: the system is not a result of ERA")
     else:
         number = np.arange(1, len(shown) + 1)
         ax.semilogy(number, np.maximum(shown / shown[0], 1e-17), "o", ms=3, color=BLUE)
@@ -187,14 +187,14 @@ def singular_values(sys: StateSpace, ax: Axes | None = None, *, values: ArrayLik
 
 
 def response(model: Model, ax: Axes | None = None) -> Axes:
-    """Draw the frequency response of a model's linear part, with its bands where they are known.
+    """Draw the frequency response of the linear part of a model, with bands if they are known.
 
     Parameters
     ----------
     model
         Any model.
     ax
-        Axes for the magnitude; the phase gets an axis at the right.
+        Axes for the magnitude. The phase has its own axis on the right.
 
     Returns
     -------

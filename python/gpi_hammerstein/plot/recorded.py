@@ -1,4 +1,4 @@
-"""What was measured."""
+"""Picture of a record."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,16 +9,16 @@ from gpi_hammerstein.plot.style import ABOVE_LEGEND, BLACK, axes, label, legend_
 
 
 def record(record: Record, ax: Axes | None = None, *, experiment: int = 0) -> Axes:
-    """Draw the inputs and the outputs of an experiment over time, what is not scored shaded.
+    """Draw the inputs and outputs of an experiment over time. Samples that are not scored are shaded.
 
     Parameters
     ----------
     record
-        What was measured.
+        The record.
     ax
-        Axes for the outputs; the inputs get an axis at the right.
+        Axes for the outputs. The inputs have their own axis on the right.
     experiment
-        Which one to draw, counted from 0.
+        The number of the experiment to draw, counted from 0.
 
     Returns
     -------

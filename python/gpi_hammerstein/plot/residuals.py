@@ -1,4 +1,4 @@
-"""Residuals in time, over frequency and over the lag."""
+"""Pictures of residuals over time, frequency and lag."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from gpi_hammerstein.plot.style import BAND, BLACK, BLUE, ORANGE, axes, label
 
 Array = NDArray[np.float64]
 
-# One residual is blue; where there are two, the second is.
+# A single residual is blue. If there are two, the second one is blue.
 COLOURS: dict[int, tuple[str, ...]] = {1: (BLUE,), 2: (ORANGE, BLUE)}
 
 
@@ -25,16 +25,16 @@ class Residuals:
     Parameters
     ----------
     record
-        What was measured.
+        The record.
     series
-        Names, and measured minus simulated output of each experiment, shape (samples, outputs), in the
-        outputs' units.
+        The residuals (measured minus simulated output) of each experiment by their name, shape
+        (samples, outputs), in the outputs' units.
     held_out
-        Pairs of first and one past the last held-out sample, of each experiment.
+        For each experiment, pairs of the first held-out sample and the first sample after the held-out block.
     noise_rms
-        Noise of each output, shape (outputs,), in its unit, where it is known.
+        Noise rms of each output, shape (outputs,), in its unit; None if it is not known.
     title
-        What is written above.
+        The title of the pictures.
 
     Examples
     --------
@@ -54,31 +54,31 @@ class Residuals:
     def of_model(
         cls, model: Model, record: Record, *, fit_start: bool = False, remove_mean: bool = False
     ) -> "Residuals":
-        """Return what a model leaves of a record, as `Model.error` takes it.
+        """Return the residual of a model on a record, as in `Model.error`.
 
         Parameters
         ----------
         model
-            Any model.
+            The model.
         record
-            A record at the model's rate.
+            A record with the sampling rate of the model.
         fit_start, remove_mean
             As in :meth:`gpi_hammerstein.Model.error`.
 
         Returns
         -------
         Residuals
-            One residual, nothing held out.
+            One residual, without held-out blocks.
 
         Raises
         ------
         ParameterError, DataError
-            The model does not accept the record's input.
+            The model does not accept the input of the record.
         """
         left = model.residual(record, fit_start=fit_start)
         if remove_mean:
             left = [e - e[start:].mean(axis=0) for e, start in zip(left, record.warmup, strict=True)]
-        return cls(record, {"residual": left}, [[] for _ in left], None, "What the model does not explain")
+        return cls(record, {"residual": left}, [[] for _ in left], None, "Residual")
 
     @classmethod
     def of_explanation(cls, found: Explanation) -> "Residuals":
@@ -87,12 +87,12 @@ class Residuals:
         Parameters
         ----------
         found
-            What `explain` returned.
+            The result of `explain`.
 
         Returns
         -------
         Residuals
-            Two residuals, with the noise floor.
+            The two residuals and the noise floor.
         """
         series = {"before": found.residuals_before, "after": found.residuals_after}
         noise = np.asarray(found.noise_floor["rms"], dtype=np.float64)
@@ -100,12 +100,12 @@ class Residuals:
         return cls(record, series, found.held_out, noise, title(found))
 
     def of(self, experiment: int, output: int) -> list[tuple[str, str, Array]]:
-        """Return name, colour and values of every residual of one output.
+        """Return the name, the colour and the values of every residual of one output.
 
         Parameters
         ----------
         experiment, output
-            Which one, counted from 0.
+            The numbers of the experiment and the output, counted from 0.
 
         Returns
         -------
@@ -119,12 +119,12 @@ class Residuals:
         ]
 
     def limit(self, experiment: int, output: int) -> float:
-        """Return how far an axis reaches; wrong samples and the warm-up must not hide the rest.
+        """Return the limit of the residual axis. Wrong samples and the warm-up do not change it.
 
         Parameters
         ----------
         experiment, output
-            Which one, counted from 0.
+            The numbers of the experiment and the output, counted from 0.
 
         Returns
         -------
@@ -135,12 +135,12 @@ class Residuals:
         return 2.5 * float(np.quantile(np.abs(scored), 0.98)) + 1e-300
 
     def label(self, output: int) -> str:
-        """Return the label of a residual's axis.
+        """Return the label of the residual axis.
 
         Parameters
         ----------
         output
-            Which one, counted from 0.
+            The number of the output, counted from 0.
 
         Returns
         -------
@@ -156,23 +156,23 @@ def rms(values: Array) -> float:
 
 
 def taken(found: Explanation | Residuals) -> Residuals:
-    """Return the residuals of either."""
+    """Return the residuals of an explanation, or the given residuals."""
     return found if isinstance(found, Residuals) else Residuals.of_explanation(found)
 
 
 def residual_in_time(
     found: Explanation | Residuals, ax: Axes | None = None, *, experiment: int = 0, output: int = 0
 ) -> Axes:
-    """Draw the residual over time, what is not scored or held out shaded.
+    """Draw the residual over time. Held-out samples and samples that are not scored are shaded.
 
     Parameters
     ----------
     found
-        What `explain` returned, or residuals.
+        The result of `explain`, or residuals.
     ax
         Axes to draw on.
     experiment, output
-        Which one to draw, counted from 0.
+        The numbers of the experiment and the output to draw, counted from 0.
 
     Returns
     -------
@@ -208,16 +208,16 @@ def residual_in_time(
 def residual_spectrum(
     found: Explanation | Residuals, ax: Axes | None = None, *, experiment: int = 0, output: int = 0
 ) -> Axes:
-    """Draw the residual's amplitude density over frequency.
+    """Draw the amplitude spectral density of the residual over frequency.
 
     Parameters
     ----------
     found
-        What `explain` returned, or residuals.
+        The result of `explain`, or residuals.
     ax
         Axes to draw on.
     experiment, output
-        Which one to draw, counted from 0.
+        The numbers of the experiment and the output to draw, counted from 0.
 
     Returns
     -------
@@ -240,12 +240,12 @@ def residual_spectrum(
         scored = values[record.warmup[experiment] :]
         segment = min(len(scored), 8192)
         frequency, power = scipy.signal.welch(scored, record.rate, nperseg=segment)
-        # a residual that is zero has no logarithm
+        # the logarithm of a zero residual is not finite
         density = np.sqrt(np.maximum(power[1:], np.finfo(np.float64).tiny))
         ax.loglog(frequency[1:], density, color=color, lw=0.9, label=name)
     if found.noise_rms is not None:
         density = found.noise_rms[output] / np.sqrt(record.rate / 2)
-        ax.axhline(density, color=BLACK, lw=0.8, ls=":", label="noise floor, if white")
+        ax.axhline(density, color=BLACK, lw=0.8, ls=":", label="noise floor (white noise)")
     ax.set_xlabel("frequency [Hz]")
     unit = record.output_units[output]
     ax.set_ylabel(label("residual density", f"{unit}/√Hz" if unit else ""))
@@ -263,20 +263,20 @@ def residual_autocorrelation(
     output: int = 0,
     lags: int = 50,
 ) -> Axes:
-    """Draw the residual's autocorrelation ``r(k) = sum e(t) e(t-k) / sum e(t)^2`` with its 95 % bounds.
+    """Draw the autocorrelation of the residual, ``r(k) = sum e(t) e(t-k) / sum e(t)^2``, with 95 % bounds.
 
     The bounds ``1.96 / sqrt(samples)`` to each side are those of white noise.
 
     Parameters
     ----------
     found
-        What `explain` returned, or residuals.
+        The result of `explain`, or residuals.
     ax
         Axes to draw on.
     experiment, output
-        Which one to draw, counted from 0.
+        The numbers of the experiment and the output to draw, counted from 0.
     lags
-        The longest lag, in samples.
+        The largest lag, in samples.
 
     Returns
     -------

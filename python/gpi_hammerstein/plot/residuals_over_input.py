@@ -1,4 +1,4 @@
-"""Residuals over the input and over its speed."""
+"""Pictures of residuals over the input and over its speed."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -7,7 +7,7 @@ from gpi_hammerstein._native import Explanation
 from gpi_hammerstein.plot.residuals import Array, Residuals, taken
 from gpi_hammerstein.plot.style import axes, label
 
-# More points than a picture has pixels only make its file large.
+# More points than a picture has pixels would only increase the size of the file.
 MOST_POINTS = 20_000
 
 
@@ -19,16 +19,16 @@ def residual_over_input(
     input: int = 0,
     output: int = 0,
 ) -> Axes:
-    """Draw the residual against the input.
+    """Draw the residual over the input.
 
     Parameters
     ----------
     found
-        What `explain` returned, or residuals.
+        The result of `explain`, or residuals.
     ax
         Axes to draw on.
     experiment, input, output
-        Which one to draw, counted from 0.
+        The numbers of the experiment, the input and the output to draw, counted from 0.
 
     Returns
     -------
@@ -57,16 +57,16 @@ def residual_over_speed(
     input: int = 0,
     output: int = 0,
 ) -> Axes:
-    """Draw the residual against the input's speed du/dt, the difference of its neighbours.
+    """Draw the residual over the speed of the input, du/dt, which is computed by central differences.
 
     Parameters
     ----------
     found
-        What `explain` returned, or residuals.
+        The result of `explain`, or residuals.
     ax
         Axes to draw on.
     experiment, input, output
-        Which one to draw, counted from 0.
+        The numbers of the experiment, the input and the output to draw, counted from 0.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def residual_over_speed(
     record = found.record
     speed = np.gradient(record.u[experiment][:, input]) * record.rate
     ax = scattered(found, speed, ax, experiment, output)
-    # a few steps must not hide the rest
+    # a few steps of the input must not determine the axis limits
     most = float(np.quantile(np.abs(speed), 0.999)) or 1.0
     ax.set_xlim(-1.2 * most, 1.2 * most)
     unit = record.input_units[input]

@@ -1,4 +1,4 @@
-"""How a model was found: the structures compared, and the steps of the fit."""
+"""Pictures of an identification: the structures that were compared, and the steps of the refinement."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,14 +23,14 @@ def candidates(found: Model | Identification, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     found
-        Result of :func:`gpi_hammerstein.identify`, or its `identification`.
+        The result of :func:`gpi_hammerstein.identify`, or its `identification`.
     ax
-        Axes for the criterion; the rms gets an axis at the right.
+        Axes for the criterion. The rms has its own axis on the right.
 
     Returns
     -------
     Axes
-        The criterion's axes; the legend tells what was chosen.
+        The axes of the criterion. The legend contains the chosen structure.
 
     Examples
     --------
@@ -40,17 +40,17 @@ def candidates(found: Model | Identification, ax: Axes | None = None) -> Axes:
     >>> ax = gpi.plot.candidates(model)
     """
     ax = axes(ax, 8.0, 4.5)
-    ax.set(xlabel="parameters used [-]", ylabel="criterion above the best [-]")
+    ax.set(xlabel="parameters used [-]", ylabel="criterion minus the best [-]")
     ax.set_title("Structures compared", pad=ABOVE_LEGEND)
     known = found.identification if isinstance(found, Model) else found
     rows = [] if known is None else known.candidates
     if not rows:
-        say_nothing_to_draw(ax, "no structures: not from identify")
+        say_nothing_to_draw(ax, "no structures: the model is not from identify")
         return ax
     used = np.array([row["used"] for row in rows])
     criterion = np.array([row["criterion"] for row in rows])
     above = criterion - criterion.min()
-    # Others stand tens of thousands above the best at 0, and one may use four times the parameters.
+    # Other structures may be tens of thousands above the best one, with up to four times the parameters.
     ax.set_yscale("symlog", linthresh=10.0)
     ax.set_ylim(-3.0, 10 * max(10.0, float(above.max())))
     ax.set_xscale("log")
@@ -80,14 +80,14 @@ def history(found: Model | Refinement, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     found
-        Result of :func:`gpi_hammerstein.identify` or :func:`gpi_hammerstein.refine`, or its `refinement`.
+        The result of :func:`gpi_hammerstein.identify` or :func:`gpi_hammerstein.refine`, or its `refinement`.
     ax
         Axes to draw on.
 
     Returns
     -------
     Axes
-        The axes. Several outputs are balanced by their residuals, so that no floor can be drawn.
+        The axes. For several outputs, the residuals are weighted, so that no noise floor is drawn.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Signals: the loop, the fit and what it leaves."""
+"""Pictures of signals: the hysteresis loop, the fit and the residual."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,8 +29,8 @@ def loop(u: ArrayLike, v: ArrayLike, model: Model | None = None, ax: Axes | None
     v
         Intermediate signal or output, shape (samples,), in the output's unit.
     model
-        A model of one input; its own loop is drawn on top, with its band where the model knows how sure
-        it is, and its units label the axes.
+        A model of one input. Its loop is also drawn, with a 95 % band if the model has a refinement. Its
+        units are used for the labels of the axes.
     ax
         Axes to draw on.
 
@@ -59,7 +59,7 @@ def loop(u: ArrayLike, v: ArrayLike, model: Model | None = None, ax: Axes | None
         ax.plot(x, own, color=VERMILION, lw=0.7, ls="--", label="model")
         if model.refinement is not None:
             shade_path(ax, x, own, model.refinement.loop_std(x).reshape(-1), VERMILION, unit_out)
-        # The place is fixed: to look for the best one takes half a minute for a long record.
+        # The place of the legend is fixed, because the search for the best place takes long for long records.
         ax.legend(loc="upper left")
     ax.set_xlabel(label("input u", unit_in))
     ax.set_ylabel(label("intermediate signal v", unit_out))
@@ -68,7 +68,7 @@ def loop(u: ArrayLike, v: ArrayLike, model: Model | None = None, ax: Axes | None
 
 
 def draw_loop(ax: Axes, model: Model, u: Array, v_hat: Array | None) -> None:
-    """Draw the loop of the first input: the model's, and v-hat where it can be seen."""
+    """Draw the hysteresis loop of the first input: that of the model, and v-hat if it is given."""
     if v_hat is not None:
         loop(u[:, 0], v_hat, model, ax)
     else:
@@ -97,23 +97,23 @@ def fit(
     model
         An identified model.
     record
-        A record at the model's rate.
+        A record with the sampling rate of the model.
     ax
         Axes to draw on.
     experiment, output
-        Which one to draw, counted from 0.
+        The numbers of the experiment and the output to draw, counted from 0.
     fit_start
-        Fit what was before the first sample, as in :meth:`gpi_hammerstein.Model.error`.
+        Fit the unknown initial state, as in :meth:`gpi_hammerstein.Model.error`.
 
     Returns
     -------
     Axes
-        The axes; the warm-up is shaded.
+        The axes. The warm-up is shaded.
 
     Raises
     ------
     ParameterError, DataError
-        The model does not accept the record's input.
+        The model does not accept the input of the record.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def fit(
     _shade_warmup(ax, record, experiment)
     warmup, samples = record.warmup[experiment], len(measured)
     if 2 * warmup > samples:
-        # A record that was split off carries all that came before it.
+        # The second part of a split record contains the whole first part as warm-up.
         ax.set_xlim((warmup - 0.1 * (samples - warmup)) / record.rate, samples / record.rate)
     legend_above(ax, *ax.get_legend_handles_labels())
     ax.set_xlabel("time [s]")
@@ -156,23 +156,23 @@ def residual(
     model
         An identified model.
     record
-        A record at the model's rate.
+        A record with the sampling rate of the model.
     ax
         Axes to draw on.
     experiment, output
-        Which one to draw, counted from 0.
+        The numbers of the experiment and the output to draw, counted from 0.
     fit_start
-        Fit what was before the first sample, as in :meth:`gpi_hammerstein.Model.error`.
+        Fit the unknown initial state, as in :meth:`gpi_hammerstein.Model.error`.
 
     Returns
     -------
     Axes
-        The axes; the warm-up is shaded.
+        The axes. The warm-up is shaded.
 
     Raises
     ------
     ParameterError, DataError
-        The model does not accept the record's input.
+        The model does not accept the input of the record.
 
     Examples
     --------
@@ -187,18 +187,18 @@ def residual(
     _shade_warmup(ax, record, experiment)
     scored = np.abs(values[record.warmup[experiment] :])
     usual, largest = (float(value) for value in np.quantile(scored, [0.99, 1.0]))
-    # An unknown start or a few outliers may leave the picture, but it says so.
+    # The first samples or a few outliers may be outside the axes; an annotation then states this.
     limit = largest if largest < 5 * usual else 2 * usual
     if limit > 0:
         ax.set_ylim(-1.15 * limit, 1.15 * limit)
     beyond = int(np.sum(scored > 1.15 * limit))
     if beyond:
-        text = f"{beyond} samples beyond, up to {largest:.3g}"
+        text = f"{beyond} samples outside, up to {largest:.3g}"
         ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize="small")
     ax.axhline(0.0, color=BLACK, lw=0.5)
     ax.set_xlabel("time [s]")
     ax.set_ylabel(label(f"residual of {record.output_names[output]}", record.output_units[output]))
-    ax.set_title("What the model does not explain")
+    ax.set_title("Residual")
     return ax
 
 

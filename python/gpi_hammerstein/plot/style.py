@@ -1,4 +1,4 @@
-"""Colours, labels and bands that all pictures share."""
+"""Colours, labels and bands for all pictures."""
 
 from collections.abc import Sequence
 
@@ -9,23 +9,23 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
-# Okabe and Ito: told apart with every kind of colour vision.
+# The palette of Okabe and Ito, which can be distinguished with every kind of colour vision.
 BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 PURPLE, SKY, BLACK = "#CC79A7", "#56B4E9", "#000000"
 CYCLE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
 STYLES = ("-", "--", ":", "-.")
 
-# Points between the axes and a title that stands above a legend.
+# Distance in points between the axes and a title above a legend.
 ABOVE_LEGEND = 26.0
 
-# Standard deviations to each side that hold 95 % of a normal distribution.
+# Number of standard deviations to each side that contain 95 % of a normal distribution.
 BAND = 1.96
 BAND_LABEL = "95 % band"
 SHADE = 0.25
 
 
 def axes(ax: Axes | None, width: float = 7.0, height: float = 4.0) -> Axes:
-    """Return the axes given, or those of a new figure."""
+    """Return the given axes, or those of a new figure."""
     if ax is not None:
         return ax
     return plt.subplots(figsize=(width, height), layout="constrained")[1]
@@ -37,12 +37,12 @@ def label(name: str, unit: str) -> str:
 
 
 def line_style(index: int) -> tuple[str, str]:
-    """Return colour and dashes of one line among many."""
+    """Return the colour and the line style of one line among many."""
     return CYCLE[index % len(CYCLE)], STYLES[index // len(CYCLE) % len(STYLES)]
 
 
 def legend_above(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    """Put the legend between title and axes, where it hides nothing; call it before the title is set."""
+    """Put the legend between the title and the axes. The title needs the distance `ABOVE_LEGEND`."""
     ax.legend(
         handles,
         labels,
@@ -55,7 +55,7 @@ def legend_above(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> 
 
 
 def say_nothing_to_draw(ax: Axes, why: str) -> None:
-    """Write a sentence where there would be a picture."""
+    """Write a message on the axes if there is nothing to draw."""
     ax.text(0.5, 0.5, why, ha="center", va="center", transform=ax.transAxes)
     ax.set(xticks=[], yticks=[])
 
@@ -63,7 +63,7 @@ def say_nothing_to_draw(ax: Axes, why: str) -> None:
 def shade(
     ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], deviation: NDArray[np.float64], color: str
 ) -> None:
-    """Shade the band around a line; gaps where the deviation is not known."""
+    """Shade the band around a line. The band has gaps where the standard deviation is not known."""
     known = np.isfinite(deviation)
     if known.any():
         half = BAND * np.where(known, deviation, 0.0)
@@ -73,7 +73,7 @@ def shade(
 
 
 def pale(color: str) -> str:
-    """Return what a colour looks like on white when it shades a band."""
+    """Return the colour of a shaded band on a white background, without transparency."""
     shares = (1 - SHADE * (1 - int(color[place : place + 2], 16) / 255) for place in (1, 3, 5))
     return "#" + "".join(f"{round(255 * share):02x}" for share in shares)
 
@@ -86,7 +86,7 @@ def shade_path(
     color: str,
     unit: str = "",
 ) -> None:
-    """Shade the band around a path that runs back and forth; its legend tells the widest half."""
+    """Shade the band around a path that runs back and forth. The legend states its largest half-width."""
     half = BAND * deviation
     known = np.isfinite(half)
     if not known.any():
@@ -95,9 +95,9 @@ def shade_path(
     corners = np.stack([lower[:-1], lower[1:], upper[1:], upper[:-1]], axis=1)
     both = known[:-1] & known[1:]
     text = f"{BAND_LABEL}, at most \u00b1{half[known].max():.2g} {unit}".rstrip()
-    # One colour without transparency: branches that overlap must not look surer.
+    # A colour without transparency, so that overlapping branches do not look darker.
     band = PolyCollection(
         list(corners[both]), facecolors=[pale(color)], edgecolors="none", zorder=1, label=text
     )
-    # Where the data leave the loop open, the band may leave the picture.
+    # Where the data do not determine the loop, the band may exceed the axes.
     ax.add_collection(band, autolim=False)

@@ -1,7 +1,7 @@
-"""One self-contained page that says what a record's model lacks.
+"""One self-contained HTML page with the results of an explanation.
 
-Everything is in the one HTML file: no network, no script from elsewhere. Pictures are SVG by Matplotlib, the
-library that draws all other pictures too; their black follows the page, dark or light.
+The HTML file contains everything: it needs no network and no external scripts. Pictures are SVG drawings of
+Matplotlib. Their text and axes have the text colour of the page, which may be dark or light.
 """
 
 from gpi_hammerstein.report.page import report_html, write_report

@@ -1,4 +1,4 @@
-"""Pictures as SVG that follow the page's colours."""
+"""SVG pictures that use the colours of the page."""
 
 import io
 import re
@@ -18,13 +18,13 @@ from gpi_hammerstein.plot.style import BLACK, BLUE, CYCLE, SHADE, pale
 
 Draw = Callable[..., object]
 
-# Axes and text are drawn in this colour, which nothing else has; it and black become the page's own.
+# Axes and text are drawn in this unique colour. It and black are replaced by the text colour of the page.
 INK = "#0a0b0c"
-# The page's own background, behind legends.
+# Background of legends, which is replaced by the background of the page.
 PAPER = "#fafbfc"
-# Experiments whose residual is drawn in time.
+# Largest number of experiments whose residual is drawn over time.
 MOST_EXPERIMENTS = 4
-# Markov parameters that a Hankel matrix is made of, at most.
+# Largest number of Markov parameters for a Hankel matrix.
 MOST_TAPS = 400
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -47,7 +47,7 @@ STYLE: dict[Any, Any] = {
 
 
 def pictures(found: Explanation) -> Iterator[tuple[str, str, Draw, tuple[float, float]]]:
-    """Yield every picture: a key, what it shows, how it is drawn, and its size in inches."""
+    """Yield every picture: a key, a caption, the function that draws it, and its size in inches."""
     model = found.model
     record = found.record
     wide, usual, square = (12.0, 4.0), (7.0, 4.2), (5.5, 5.5)
@@ -56,28 +56,38 @@ def pictures(found: Explanation) -> Iterator[tuple[str, str, Draw, tuple[float, 
         u = record.u[0]
         draw_loop(ax, model, u, None)
 
-    yield "loop", "Output over input: measured, before and after.", lambda ax: plot.loops(found, ax), square
-    yield "loop-v", "The hysteresis alone: what the dynamics are driven with.", hysteresis, square
+    yield (
+        "loop",
+        "Output over input: measured, and simulated before and after.",
+        lambda ax: plot.loops(found, ax),
+        square,
+    )
+    yield (
+        "loop-v",
+        "Hysteresis loop of the model: the intermediate signal over the input.",
+        hysteresis,
+        square,
+    )
     for index, name in enumerate(record.output_names):
         of = f" of {name}" if len(record.output_names) > 1 else ""
         for experiment in range(min(len(record.u), MOST_EXPERIMENTS)):
             when = f", experiment {experiment}" if len(record.u) > 1 else ""
             draw_time = partial(plot.residual_in_time, found, experiment=experiment, output=index)
-            yield f"time-{index}-{experiment}", f"The residual{of} in time{when}.", draw_time, wide
+            yield f"time-{index}-{experiment}", f"Residual{of} over time{when}.", draw_time, wide
         draws: list[tuple[str, str, Callable[..., Axes], tuple[float, float]]] = [
-            ("spectrum", f"The residual{of} over frequency.", plot.residual_spectrum, usual),
-            ("input", f"The residual{of} over the input.", plot.residual_over_input, usual),
-            ("speed", f"The residual{of} over the input's speed.", plot.residual_over_speed, usual),
+            ("spectrum", f"Residual{of} over frequency.", plot.residual_spectrum, usual),
+            ("input", f"Residual{of} over the input.", plot.residual_over_input, usual),
+            ("speed", f"Residual{of} over the speed of the input.", plot.residual_over_speed, usual),
             (
                 "autocorrelation",
-                f"How far the residual{of} remembers itself.",
+                f"Autocorrelation of the residual{of}.",
                 plot.residual_autocorrelation,
                 usual,
             ),
         ]
         for key, what, draw, size in draws:
             yield f"{key}-{index}", what, partial(draw, found, output=index), size
-    bode = "The frequency response of the linear part, with bands where they are known."
+    bode = "Frequency response of the linear part, with 95 % bands if they are known."
     yield (
         "bode",
         bode,
@@ -87,38 +97,38 @@ def pictures(found: Explanation) -> Iterator[tuple[str, str, Draw, tuple[float, 
     yield "markov", "Markov parameters of the linear part.", lambda ax: plot.markov(model, ax), usual
     yield (
         "singular-values",
-        "Singular values of the Hankel matrix of its Markov parameters.",
+        "Singular values of the Hankel matrix of these Markov parameters.",
         lambda ax: plot.singular_values(realised(model), ax),
         usual,
     )
 
 
 def realised(model: Model) -> StateSpace:
-    """Return the linear part as ERA sees it, which knows its singular values."""
+    """Return the linear part as a result of ERA, which contains singular values."""
     taps = max(settling_taps(model.linear), 4 * model.linear.order + 2)
     return era(model.linear.markov(min(taps, MOST_TAPS)), max(model.linear.order, 1))
 
 
 def page_colours() -> dict[str, str]:
-    """Return what colours of a picture are on the page, which may be light or dark."""
+    """Return the colours of the page for each colour of a picture. The page may be light or dark."""
     mixed = {pale(own): f"color-mix(in srgb, {own} {100 * SHADE:g}%, var(--paper))" for own in CYCLE}
     return mixed | {INK: "currentColor", BLACK: "currentColor", PAPER: "var(--paper)", BLUE: "var(--blue)"}
 
 
 def as_svg(key: str, draw: Draw, size: tuple[float, float]) -> str:
-    """Draw one picture as an SVG element; nothing of pyplot's state is touched."""
+    """Draw one picture as an SVG element, without use of the state of pyplot."""
     text = io.StringIO()
-    # the salt keeps the names of clip paths apart, and the file the same from run to run
+    # the salt makes the names of clip paths unique and reproducible
     with mpl.rc_context({**STYLE, "svg.hashsalt": key}):
         figure = Figure(figsize=size, layout="constrained")
         draw(ax=figure.add_subplot())
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
     svg = re.sub("<!--.*?-->", "", svg[svg.index("<svg") :], flags=re.DOTALL)
-    # powers of ten name one font; where it is missing, another one without serifs will do
+    # powers of ten request one font: add a fallback
     svg = svg.replace("font-family: 'DejaVu Sans';", "font-family: 'DejaVu Sans', sans-serif;")
     for color, by_page in page_colours().items():
         svg = re.sub(color, by_page, svg, flags=re.IGNORECASE)
-    # the page gives the width
+    # the page determines the size
     head, rest = svg.split(">", 1)
     return re.sub(r' (?:width|height)="[^"]*"', "", head) + ">" + rest

@@ -1,4 +1,4 @@
-"""What a notebook shows of a record, a model and an explanation."""
+"""HTML representations of a record, a model and an explanation for notebooks."""
 
 from html import escape
 
@@ -9,12 +9,12 @@ from gpi_hammerstein.report.quality import facts
 
 
 def record(record: Record) -> str:
-    """Return rate, length and range of a record as an HTML table."""
+    """Return the rate, the length and the ranges of a record as an HTML table."""
     return tables.pairs(facts(record))
 
 
 def model(model: Model) -> str:
-    """Return the parts of a model as HTML tables."""
+    """Return the structure and the poles of a model as HTML tables."""
     rows = dict(tables.structure(model))
     rows["sampling rate"] = f"{model.rate:g} Hz"
     if model.effects:
@@ -26,7 +26,7 @@ def model(model: Model) -> str:
 
 
 def explanation(found: Explanation) -> str:
-    """Return what an explanation found as sentences and HTML tables."""
+    """Return the result of an explanation as sentences and HTML tables."""
     units = set(found.record.output_units)
     unit = units.pop() if len(units) == 1 else ""
     words = "".join(f"<p>{escape(one)}</p>" for one in in_words(to_dict(found), unit, numbers=False))

@@ -1,4 +1,4 @@
-"""The page itself."""
+"""The HTML page of a report."""
 
 import os
 from collections.abc import Sequence
@@ -14,11 +14,11 @@ from gpi_hammerstein.report.figures import as_svg, pictures
 from gpi_hammerstein.report.quality import facts
 
 VERDICTS = {
-    "explained": "Explained: what is left is noise.",
-    "partly-explained": "Partly explained: structure is left.",
-    "unattributed": "Unattributed: no effect of the catalogue explains what is left.",
+    "explained": "Explained: the residual has no structure beyond noise.",
+    "partly-explained": "Partly explained: the residual still has structure.",
+    "unattributed": "Unattributed: no effect of the catalogue explains the residual.",
 }
-# Which pictures belong to which part of the page, by the beginning of their keys.
+# Pictures of each part of the page, by the beginning of their keys.
 PARTS: dict[str, tuple[str, ...]] = {
     "loop": ("loop",),
     "residual": ("time", "spectrum", "input", "speed", "autocorrelation"),
@@ -27,16 +27,16 @@ PARTS: dict[str, tuple[str, ...]] = {
 
 
 def report_html(found: Explanation, *, command: str | None = None, notes: Sequence[str] = ()) -> str:
-    """Return a report as one HTML page that needs nothing else.
+    """Return a report as one self-contained HTML page.
 
     Parameters
     ----------
     found
-        What `explain` returned.
+        The result of `explain`.
     command
-        The command that made it, for the foot of the page.
+        The command that made the report, for the footer of the page.
     notes
-        What was done to the samples on the way in.
+        Notes on changes of the samples while they were read.
 
     Returns
     -------
@@ -81,19 +81,19 @@ def report_html(found: Explanation, *, command: str | None = None, notes: Sequen
 
 
 def figure(key: str, what: str, svg: str) -> str:
-    """Return a picture that a click enlarges."""
+    """Return a picture that is enlarged by a click."""
     kind, text = key.split("-")[0], escape(what)
     button = f'<button class="open" aria-label="Enlarge: {text}">{svg}</button>'
     return f'<figure class="{kind}">{button}<figcaption>{text}</figcaption></figure>'
 
 
 def next_experiment(found: Explanation) -> str:
-    """Return what to measure next, nothing where nothing is asked for."""
+    """Return the section on the next experiment; it is empty if none is proposed."""
     if not found.next_experiment:
         return ""
     why, command = found.next_experiment["why"], found.next_experiment["command"]
     line = f"<pre>{escape(command)}</pre>" if command else ""
-    return f"<section><h2>What to measure next</h2><p>{escape(why)}.</p>{line}</section>"
+    return f"<section><h2>Next experiment</h2><p>{escape(why)}.</p>{line}</section>"
 
 
 def write_report(
@@ -103,18 +103,18 @@ def write_report(
     command: str | None = None,
     notes: Sequence[str] = (),
 ) -> None:
-    """Write a report as one HTML file, whole or not at all.
+    """Write a report as one HTML file. The write is atomic.
 
     Parameters
     ----------
     found
-        What `explain` returned.
+        The result of `explain`.
     path
-        The file, such as ``report.html``.
+        The file, for example ``report.html``.
     command
-        The command that made it, for the foot of the page.
+        The command that made the report, for the footer of the page.
     notes
-        What was done to the samples on the way in.
+        Notes on changes of the samples while they were read.
 
     Raises
     ------

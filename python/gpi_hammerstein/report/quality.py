@@ -1,4 +1,4 @@
-"""What a record says about itself: rate, range, rests, saturation, quantisation, excitation."""
+"""The quality of a record: rate, ranges, saturation, quantisation, excitation."""
 
 from collections.abc import Iterator
 
@@ -9,24 +9,24 @@ from gpi_hammerstein._native import Record
 
 Array = NDArray[np.float64]
 
-# Part of the samples at exactly the largest or smallest value from which on a sensor may be saturated.
+# Share of samples at exactly the largest or smallest value, above which a sensor may be saturated.
 SATURATED = 0.005
-# Part of a signal's power that is left above the frequency that is said.
+# Share of the power of a signal above the frequency that is reported.
 LEFT = 0.01
 
 
 def facts(record: Record) -> Iterator[tuple[str, str]]:
-    """Yield what a record is, as pairs of a name and a text.
+    """Yield the properties of a record, as pairs of a name and a text.
 
     Parameters
     ----------
     record
-        What was measured.
+        The record.
 
     Yields
     ------
     tuple of str
-        A name and what there is to say.
+        The name and the text of a property.
 
     Examples
     --------
@@ -42,11 +42,11 @@ def facts(record: Record) -> Iterator[tuple[str, str]]:
     for name, unit, signal in channels(record):
         yield name, signal_facts(np.concatenate(signal), unit)
     for index, name in enumerate(record.input_names):
-        yield f"{name} excites", excitation([u[:, index] for u in record.u], record.rate)
+        yield f"excitation by {name}", excitation([u[:, index] for u in record.u], record.rate)
 
 
 def channels(record: Record) -> Iterator[tuple[str, str, list[Array]]]:
-    """Yield name, unit and the experiments of each input and output."""
+    """Yield the name, the unit and the experiments of each input and output."""
     inputs = zip(record.input_names, record.input_units, strict=True)
     for index, (name, unit) in enumerate(inputs):
         yield name, unit, [u[:, index] for u in record.u]
@@ -56,7 +56,7 @@ def channels(record: Record) -> Iterator[tuple[str, str, list[Array]]]:
 
 
 def signal_facts(signal: Array, unit: str) -> str:
-    """Return range, quantisation and saturation of a signal in words."""
+    """Return the range, the quantisation and the saturation of a signal as text."""
     low, high = float(signal.min()), float(signal.max())
     words = [f"{low:.4g} to {high:.4g} {unit}".rstrip()]
     levels = np.unique(signal)
@@ -71,13 +71,13 @@ def signal_facts(signal: Array, unit: str) -> str:
 
 
 def excitation(experiments: list[Array], rate: float) -> str:
-    """Return up to which frequency nearly all of a signal's changes lie."""
+    """Return the frequency below which nearly all of the power of a signal lies, without its mean."""
     samples = min(len(u) for u in experiments)
     spectra = [np.abs(np.fft.rfft((u - u.mean())[:samples])) ** 2 for u in experiments]
     power = np.sum(spectra, axis=0)
     frequency = np.fft.rfftfreq(samples, 1 / rate)
     total = power.sum()
     if not total > 0:
-        return "nothing: it does not move"
+        return "none: the input is constant"
     place = int(np.searchsorted(np.cumsum(power), (1 - LEFT) * total))
-    return f"{100 * (1 - LEFT):.0f} % of its power below {frequency[min(place, len(frequency) - 1)]:.4g} Hz"
+    return f"{100 * (1 - LEFT):.0f} % of the power below {frequency[min(place, len(frequency) - 1)]:.4g} Hz"

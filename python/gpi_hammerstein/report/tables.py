@@ -1,4 +1,4 @@
-"""Tables of a report as HTML."""
+"""HTML tables of a report."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
@@ -14,7 +14,7 @@ Row = Sequence[str]
 
 
 def table(head: Row, rows: Iterable[Row], numbers: Sequence[int] = ()) -> str:
-    """Return a table; the columns `numbers` are set to the right."""
+    """Return a table. The columns `numbers` are aligned to the right."""
 
     def cells(tag: str, row: Row) -> str:
         kinds = [' class="number"' if place in numbers else "" for place in range(len(row))]
@@ -25,7 +25,7 @@ def table(head: Row, rows: Iterable[Row], numbers: Sequence[int] = ()) -> str:
 
 
 def errors(found: Explanation, unit: str) -> str:
-    """Return the errors before and after, fitted and held out."""
+    """Return the errors before and after, on fitted and on held-out data."""
     label = f" [{unit}]" if unit else ""
     head = ["", f"rms{label}", "rms / span", "fit", f"largest{label}", "rms / noise"]
     noise = float(np.sqrt(np.mean(np.square(found.noise_floor["rms"]))))
@@ -48,7 +48,7 @@ def errors(found: Explanation, unit: str) -> str:
 
 
 def effects(found: Explanation) -> str:
-    """Return the parameters of every effect with their uncertainty and unit."""
+    """Return the parameters of every effect, with their uncertainties and units."""
     names, shown = effect_names(), set[str]()
     rows = []
     for step in found.steps:
@@ -62,19 +62,19 @@ def effects(found: Explanation) -> str:
             rows.append([*first, row["name"], f"{row['value']:.5g}", spread, row["unit"]])
             first = ["", ""]
     if not rows:
-        return "<p>None was added.</p>"
+        return "<p>No effect was added.</p>"
     head = ["effect", "what it is", "parameter", "value", "95 %", "unit"]
     return table(head, rows, (3, 4))
 
 
 def rejected(found: Explanation) -> str:
-    """Return what was tried and not taken."""
+    """Return the effects that were tried and not added."""
     rows = [[other["effect"], other["why"]] for other in found.rejected]
-    return table(["effect", "why it was not taken"], rows) if rows else ""
+    return table(["effect", "why it was not added"], rows) if rows else ""
 
 
 def tests(found: Explanation) -> str:
-    """Return the tests of what is left."""
+    """Return the tests of the residual."""
     rows = [
         [
             test["output"],
@@ -92,15 +92,15 @@ def tests(found: Explanation) -> str:
 
 
 def poles(model: Model) -> str:
-    """Return the poles as frequencies with damping, or as time constants."""
+    """Return the poles as frequencies with damping ratios, or as time constants."""
     rows = list(pole_rows(model))
     if not rows:
-        return "<p>None but those of a dead time.</p>"
+        return "<p>There are no poles except those of the dead time.</p>"
     return table(["pole", "frequency [Hz]", "damping", "time constant [s]"], rows, (1, 2, 3))
 
 
 def pole_rows(model: Model) -> Iterator[list[str]]:
-    """Yield a row for each pole that is no delay, one for each pair."""
+    """Yield a row for each real pole and each pair of poles, without the poles of a dead time."""
     for pole in model.linear.poles:
         if is_late(pole) or pole.imag < 0:
             continue
@@ -115,12 +115,12 @@ def pole_rows(model: Model) -> Iterator[list[str]]:
 
 
 def pairs(rows: Iterable[tuple[str, str]]) -> str:
-    """Return names and what belongs to them."""
+    """Return a table of names and texts, without headings."""
     return table(["", ""], rows).replace("<tr><th></th><th></th></tr>", "")
 
 
 def structure(model: Model) -> Mapping[str, Any]:
-    """Return what the model is made of, in words."""
+    """Return the structure of a model as text."""
     words = {}
     for name, gpi in zip(model.input_names, model.hysteresis, strict=True):
         plays, zones = len(gpi.plays.weights), len(gpi.envelope.weights)
@@ -134,5 +134,5 @@ def structure(model: Model) -> Mapping[str, Any]:
 
 
 def is_late(pole: complex) -> bool:
-    """Whether a pole is one of a dead time; several in one place come out of rounding apart."""
+    """Return whether a pole belongs to a dead time. Rounding errors separate multiple poles at zero."""
     return abs(pole) < 1e-3

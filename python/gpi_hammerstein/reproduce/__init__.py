@@ -1,1 +1,1 @@
-"""Published examples and benchmarks, run again."""
+"""Reproduction of published examples and benchmarks."""

@@ -1,4 +1,4 @@
-"""Files of a public benchmark: from a folder, or fetched from their address and checked."""
+"""Files of a public benchmark, from a local folder or from a download that is checked."""
 
 import hashlib
 import os
@@ -13,18 +13,18 @@ TIMEOUT = 60.0
 
 
 def local_folder(name: str) -> Path:
-    """Return where a benchmark's files are kept on this machine.
+    """Return the local folder of the files of a benchmark.
 
     Parameters
     ----------
     name
-        The benchmark's name.
+        The name of the benchmark.
 
     Returns
     -------
     Path
-        ``measured/NAME`` of the folder in the environment variable ``GPI_DATA_DIR``, of ``../shared`` or of
-        ``shared`` if there is one; else a folder of the user's cache, which need not exist yet.
+        ``measured/NAME`` in the folder of the environment variable ``GPI_DATA_DIR``, else in ``../shared`` or
+        ``shared``. If there is none, a folder in the cache of the user, which may not exist yet.
 
     Examples
     --------
@@ -41,16 +41,16 @@ def local_folder(name: str) -> Path:
 
 
 def fetch(address: str, checksums: Mapping[str, str], folder: Path) -> list[Path]:
-    """Return files of a benchmark, fetching those that the folder lacks.
+    """Return the files of a benchmark, and download those that are not in the folder.
 
     Parameters
     ----------
     address
-        What the files' names are appended to.
+        The address to which the file names are appended.
     checksums
-        SHA-256 of each file, by its name.
+        The SHA-256 of each file, by its name.
     folder
-        Where they are kept.
+        The folder of the files.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def fetch(address: str, checksums: Mapping[str, str], folder: Path) -> list[Path
     Raises
     ------
     DataError
-        A file cannot be fetched, or is not the one that was published.
+        A file cannot be downloaded, or is not the published file.
 
     Examples
     --------
@@ -79,13 +79,14 @@ def _file(address: str, digest: str, path: Path) -> Path:
                 content = answer.read()
         except OSError as error:
             raise DataError(
-                f"{address}: cannot be fetched ({error}); put {path.name} into {path.parent} yourself"
+                f"{address}: cannot be downloaded ({error}); put {path.name} into {path.parent} manually"
             ) from error
     found = hashlib.sha256(content).hexdigest()
     if found != digest:
         where = path if path.exists() else address
         raise DataError(
-            f"{where}: not the published file (SHA-256 {found[:12]}.., not {digest[:12]}..); fetch it anew"
+            f"{where}: not the published file (SHA-256 {found[:12]}.., not {digest[:12]}..); "
+            "download it again"
         )
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)

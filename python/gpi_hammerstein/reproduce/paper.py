@@ -1,4 +1,4 @@
-"""The numerical example of the source paper, run from its own numbers.
+"""The numerical example of the source paper, computed from the numbers in the paper.
 
 K. F. Aljanaideh, M. Al Janaideh, M. Rakotondrabe and D. Kundur, *Identification of Piezomicropositioning
 Hammerstein Systems with Generalized Prandtl-Ishlinskii Hysteresis Nonlinearities*: section "Numerical
@@ -20,7 +20,7 @@ SAMPLES = 100_001
 TAPS = 31
 ORDERS = (2, 3)
 INVERSE_TAPS = 40
-# The joint refinement needs no more.
+# The joint refinement does not need more samples.
 REFINED_SAMPLES = 20_001
 
 NUMERATOR = (3.391e10,)
@@ -34,22 +34,24 @@ DEADZONE_WEIGHTS = (
 )
 
 ERRATA = (
-    "The paper's printing errors: (49) is (48) held and sampled every 1e-2 s, not every 1e-5 s as the "
-    "text says; at 1e-5 s the input excites {rank} of the 31 taps (singular values above 1e-6 of the "
-    "largest), at 1e-2 s all of them, so 1e-2 s is used here. The envelope is called "
-    "memoryless with positive weights and thresholds, but (3) depends on the sign of u(k) - u(k-1), most "
-    "weights are negative and the thresholds run from -6.4 to 6.4; hence two readings: `one-sided` "
-    "(memoryless, the usual deadzone) and `directional` ((3) as printed). The estimate comes nearest to "
-    "the truth under a third one, `symmetric`, in which every threshold acts with both signs. The caption "
-    "of figure 6 has sin(Ts k), the text 10 sin(Ts k); only the latter reaches the thresholds. (10) "
-    "writes Gamma_r for F_r. And the estimate of G keeps a bias however long the record is: a play has "
-    "memory, so the term that (42) to (44) neglect is itself a mild filter."
+    "The paper has several printing errors. (49) is (48) with a zero-order hold and a sampling period of "
+    "1e-2 s, not 1e-5 s as the text states. At 1e-5 s, the order of persistent excitation is {rank} for "
+    "31 taps (singular values above 1e-6 of the largest). At 1e-2 s it is 31, so that 1e-2 s is used "
+    "here. The paper describes the envelope as memoryless, with positive weights and thresholds. However, "
+    "(3) depends on the sign of u(k) - u(k-1), most weights are negative, and the thresholds are between "
+    "-6.4 and 6.4. There are therefore two deadzone conventions: `one-sided` (memoryless, the usual "
+    "deadzone) and `directional` ((3) as printed). The estimate is closest to the truth with a third "
+    "convention, `symmetric`, in which every threshold acts with both signs. The caption of figure 6 "
+    "states sin(Ts k), the text states 10 sin(Ts k). Only the latter reaches the thresholds. (10) writes "
+    "Gamma_r instead of F_r. Finally, the estimate of G has a bias that does not decrease with the length "
+    "of the record. A play has memory, so that the term that (42) to (44) neglect is itself a weak "
+    "filter."
 )
 
 
 @dataclass(frozen=True)
 class Realisation:
-    """What one ERA order leads to."""
+    """The results for one order of ERA."""
 
     order: int
     system: StateSpace
@@ -58,33 +60,33 @@ class Realisation:
     truncation: float
     """Truncation error of the noncausal inverse."""
     v_hat: Array
-    """Intermediate signal seen through the inverse for the sine, scaled to v, (6000,)."""
+    """Estimate of the intermediate signal for the sine, by the noncausal inverse, scaled to v, (6000,)."""
     v_error: float
     """rms of v_hat - v over samples 200 to 5799 as a fraction of the span of v."""
     v_hat_multisine: Array
-    """The same for the record's first 6000 samples, scaled to v."""
+    """The same for the first 6000 samples of the record, scaled to v."""
 
 
 @dataclass(frozen=True)
 class RefinedResult:
-    """What the joint refinement makes of the same record, with the true order and grids given."""
+    """The result of the joint refinement, with the true order, half-widths and thresholds."""
 
     system: StateSpace
     system_error: float
     """Relative error of G(e^jw) after scaling, over 1000 frequencies from 0 to pi."""
     weights_error: float
-    """Largest error of a play weight over the largest weight, after scaling to the true sum; NaN where
-    the record does not determine them."""
+    """Largest error of a play weight over the largest weight, after scaling to the true sum; NaN if the
+    record does not determine the weights."""
     deadzone_weights_error: float
     """The same for the deadzone weights, after scaling."""
     undetermined: int
-    """Combinations of parameters that the record does not determine."""
+    """Number of unidentifiable combinations of parameters."""
     status: str
 
 
 @dataclass(frozen=True)
 class ReadingResult:
-    """What one reading of equation (3) leads to."""
+    """The results for one deadzone convention of equation (3)."""
 
     name: str
     condition: float
@@ -104,7 +106,7 @@ class ReadingResult:
 
 @dataclass(frozen=True)
 class Paper:
-    """The numbers behind figures 3 to 6."""
+    """The numbers of figures 3 to 6."""
 
     system: StateSpace
     """G, (49): the zero-order hold of (48) at 1e-2 s."""
@@ -112,26 +114,27 @@ class Paper:
     """True Markov parameters, (31,)."""
     readings: list[ReadingResult]
     printed_rank: int
-    """Taps that the input excites at the sampling period that the paper prints, 1e-5 s."""
+    """Order of persistent excitation (31 taps) at the sampling period that the paper prints, 1e-5 s."""
 
     @property
     def errata(self) -> str:
-        """What is printed wrongly in the paper, in one paragraph."""
+        """The printing errors of the paper, in one paragraph."""
         return ERRATA.format(rank=self.printed_rank)
 
 
 def envelope(reading: str) -> Deadzones:
-    """Build the envelope D of the example.
+    """Return the envelope D of the example.
 
     Parameters
     ----------
     reading
-        ``"one-sided"``, ``"directional"``, or ``"symmetric"``: every threshold acts with both signs.
+        The deadzone convention: ``"one-sided"``, ``"directional"``, or ``"symmetric"``. In the last one,
+        every threshold acts with both signs.
 
     Returns
     -------
     Deadzones
-        The 17 weighted deadzones; 34 one-sided ones for the symmetric reading.
+        The 17 weighted deadzones; one-sided ones with both signs for the symmetric convention.
 
     Examples
     --------
@@ -143,13 +146,13 @@ def envelope(reading: str) -> Deadzones:
         return Deadzones(THRESHOLDS, DEADZONE_WEIGHTS, reading="directional" if printed else "one-sided")
     size = np.abs(THRESHOLDS)
     weights = np.array(DEADZONE_WEIGHTS)
-    # A threshold of zero passes u whole: once, not once for each sign.
+    # A threshold of zero passes u completely, and must not be counted twice.
     mirrored = size > 0
     return Deadzones(np.concatenate([size, -size[mirrored]]), np.concatenate([weights, weights[mirrored]]))
 
 
 def excitation(period: float = PERIOD) -> Array:
-    """Return u(k) = sum over i = 1..1000 of 5 sin(i Ts k), summed in closed form; Ts in seconds."""
+    """Return u(k) = sum over i = 1..1000 of 5 sin(i Ts k) in closed form; Ts in seconds."""
     x = period * np.arange(SAMPLES)
     half = np.sin(x / 2)
     at_zero = half == 0
@@ -157,13 +160,13 @@ def excitation(period: float = PERIOD) -> Array:
 
 
 def scale_to(estimate: ArrayLike, truth: ArrayLike) -> float:
-    """Return the factor that brings `estimate` nearest to `truth` in the least-squares sense."""
+    """Return the factor that brings `estimate` closest to `truth` in the least-squares sense."""
     a, b = np.ravel(estimate), np.ravel(truth)
     return float(np.real(np.vdot(a, b)) / np.real(np.vdot(a, a)))
 
 
 def relative_error(estimate: ArrayLike, truth: ArrayLike) -> float:
-    """Return how far an estimate, divided by its projection on the truth, is from the truth."""
+    """Return the relative error of an estimate after division by its projection on the truth."""
     a, b = np.ravel(estimate), np.ravel(truth)
     factor = np.real(np.vdot(b, a)) / np.real(np.vdot(b, b))
     return float(np.linalg.norm(a / factor - b) / np.linalg.norm(b))
@@ -175,7 +178,7 @@ def response(system: StateSpace, angles: Array) -> ComplexArray:
 
 
 def paper() -> Paper:
-    """Run the example for both readings of (3) and for the symmetric variant.
+    """Run the example for both deadzone conventions of (3) and for the symmetric variant.
 
     Returns
     -------
@@ -194,7 +197,7 @@ def paper() -> Paper:
 
 
 def run_reading(name: str, system: StateSpace) -> ReadingResult:
-    """Run the chain FIR, ERA, noncausal inverse for one reading.
+    """Run FIR, ERA and noncausal inverse for one deadzone convention.
 
     Parameters
     ----------
@@ -206,7 +209,7 @@ def run_reading(name: str, system: StateSpace) -> ReadingResult:
     Returns
     -------
     ReadingResult
-        What came out, next to the truth.
+        The estimates and the true values.
 
     Examples
     --------
@@ -258,12 +261,12 @@ def run_reading(name: str, system: StateSpace) -> ReadingResult:
 
 
 def refine_reading(hysteresis: Gpi, u: Array, y: Array, system: StateSpace) -> RefinedResult:
-    """Identify and refine the example with the true order, thresholds, half-widths and reading.
+    """Identify and refine the example with the true order, thresholds, half-widths and convention.
 
     Parameters
     ----------
     hysteresis
-        The true one.
+        The true hysteresis.
     u, y
         Input and output without noise, (samples,).
     system
@@ -272,7 +275,7 @@ def refine_reading(hysteresis: Gpi, u: Array, y: Array, system: StateSpace) -> R
     Returns
     -------
     RefinedResult
-        What came out, next to the truth.
+        The estimates and the true values.
 
     Examples
     --------
@@ -295,13 +298,13 @@ def refine_reading(hysteresis: Gpi, u: Array, y: Array, system: StateSpace) -> R
     found = np.interp(truth_plays.half_widths, plays.half_widths, plays.weights, left=0.0, right=0.0)
     found[~np.isin(truth_plays.half_widths, plays.half_widths)] = 0.0
     found *= truth_plays.weights.sum() / found.sum()
-    # Deadzones of one threshold are one.
+    # Deadzones of equal thresholds are combined.
     thresholds = np.unique(truth_envelope.thresholds)
     of = [truth_envelope.thresholds == eta for eta in thresholds]
     truth_slope = np.array([truth_envelope.weights[own].sum() for own in of])
     slopes = dict(zip(envelope.thresholds, envelope.weights, strict=True))
     slope = np.array([slopes.get(eta, 0.0) for eta in thresholds])
-    # G and z may both have changed their signs; where all plays slide all the time, z has no scale.
+    # G and z may both have the opposite sign. If all plays slide all the time, the scale of z is arbitrary.
     slope *= scale_to(slope, truth_slope)
     known = [p["std"] is not None for p in refinement.parameters if p["name"].startswith("u.weights")]
     worst = float(np.abs(found - truth_plays.weights).max() / truth_plays.weights.max())

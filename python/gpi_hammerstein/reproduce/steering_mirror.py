@@ -1,9 +1,9 @@
-"""A fast steering mirror: three piezos in, three displacements out, driven at three amplitudes.
+"""A fast steering mirror with three piezos and three displacements, driven at three amplitudes.
 
 Measured at KU Leuven, M. Floren, *fsm-benchmark-data* (CC BY 4.0): random-phase multisines of 8192 samples at
-6.4 kHz, two periods, six realisations an amplitude. Its resonances fall with amplitude, which no hysteresis
-at the input can do. The published errors are those of the repository's notebooks on its own test
-realisations; here the last of the six realisations is held out.
+6.4 kHz, with two periods and six realisations for each amplitude. The resonance frequencies decrease with the
+amplitude. Hysteresis at the input cannot have this effect. The published errors are those of the notebooks in
+the repository, on its own test realisations. Here, the last of the six realisations is held out.
 """
 
 import json
@@ -37,11 +37,11 @@ RATE = 6400.0
 MICRO = 1e6
 LEVELS = (100, 200, 300)
 HELD_OUT = 5
-# Samples of the first period before the second one: the modes forget in a tenth of it.
+# Samples of the first period that are used as warm-up. The transient of the modes takes a tenth of them.
 LEAD = 2048
-# Modes up to 3 kHz, of three inputs and three outputs.
+# Order for the modes up to 3 kHz of three inputs and three outputs.
 ORDER = 44
-# One model for all amplitudes, relative errors in % at each of them.
+# Relative errors in % at each amplitude, of one model for all amplitudes.
 PUBLISHED = {
     "published, linear, 28 states": (18.61, 6.61, 16.28),
     "published, neural network in the loop (2x64)": (6.37, 4.84, 4.19),
@@ -50,38 +50,38 @@ PUBLISHED = {
 
 @dataclass(frozen=True)
 class Level:
-    """Steady state at one amplitude."""
+    """The steady state at one amplitude."""
 
     millivolts: int
     inputs: list[Array]
-    """u of each realisation in V, (2 periods, 3)."""
+    """u of each realisation in V, two periods, (samples, 3)."""
     outputs: list[Array]
-    """y in um, (2 periods, 3)."""
+    """y of each realisation in um, two periods, (samples, 3)."""
 
     @property
     def period(self) -> int:
-        """Samples of one period."""
+        """Number of samples of one period."""
         return len(self.inputs[0]) // 2
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A model for all amplitudes."""
+    """One of the models, with its errors at all amplitudes."""
 
     name: str
     model: Model
     parameters: int
     errors: dict[int, float]
-    """Relative error in % at each amplitude in mV, on the realisation that took no part."""
+    """Relative error in % at each amplitude in mV, on the held-out realisation."""
 
 
 @dataclass(frozen=True)
 class SteeringMirror:
-    """What was found on the way from the linear model to the last one."""
+    """The models, from the linear one to the last one."""
 
     levels: list[Level]
     fitted: tuple[int, ...]
-    """Amplitudes in mV that took part in the fit."""
+    """Amplitudes in mV that were used for the fit."""
     found: Explanation
     stages: list[Stage]
     seconds: float
@@ -95,32 +95,32 @@ def steering_mirror(
     realisations: int = HELD_OUT,
     progress: Callable[[str, float], object] | None = None,
 ) -> SteeringMirror:
-    """Explain the records of all amplitudes together, and test on a realisation that took no part.
+    """Explain the records of all amplitudes together, and test on a held-out realisation.
 
     Parameters
     ----------
     folder
-        Where the arrays are; found, or fetched from their public address, when None.
+        The folder of the arrays. None takes the data folder, or downloads the arrays.
     fitted
-        Amplitudes in mV that take part in the fit; all three are tested.
+        Amplitudes in mV that are used for the fit. All three amplitudes are tested.
     order
-        States of the linear part.
+        Order (number of states) of the linear part.
     realisations
-        How many of the five take part in the fit.
+        Number of realisations, of the first five, that are used for the fit.
     progress
-        As for `explain`.
+        As in `explain`.
 
     Returns
     -------
     SteeringMirror
-        The models before and after every effect, with their errors.
+        The models before and after each effect, with their errors.
 
     Raises
     ------
     DataError
-        The arrays are not there and cannot be fetched.
+        The arrays are not found and cannot be downloaded.
     ParameterError
-        An amplitude that was not measured.
+        An amplitude was not measured.
 
     Examples
     --------
@@ -129,9 +129,9 @@ def steering_mirror(
     """
     unknown = [level for level in fitted if level not in LEVELS]
     if unknown or not fitted:
-        raise ParameterError(f"`fitted` = {list(fitted)}: amplitudes in mV out of {list(LEVELS)}")
+        raise ParameterError(f"`fitted` = {list(fitted)}: must be amplitudes in mV out of {list(LEVELS)}")
     if not 1 <= realisations <= HELD_OUT:
-        raise ParameterError(f"`realisations` = {realisations}: between 1 and {HELD_OUT}")
+        raise ParameterError(f"`realisations` = {realisations}: must be between 1 and {HELD_OUT}")
     levels = read(folder or local_folder(NAME))
     own = [level for level in levels if level.millivolts in fitted]
     record = Record(
@@ -143,7 +143,7 @@ def steering_mirror(
         output_units=["um"] * 3,
     )
     start = time.perf_counter()
-    # no hysteresis at the input: what it would take is asked of the residual
+    # no hysteresis at the input: the search finds it if it is present
     found = explain(record, order=order, half_widths=[0.0], thresholds=0, progress=progress)
     seconds = time.perf_counter() - start
     models = [*found.models[:-1], found.model]
@@ -161,12 +161,12 @@ def steering_mirror(
 
 
 def read(folder: Path) -> list[Level]:
-    """Read the arrays, fetching those that the folder lacks.
+    """Read the arrays, and download those that are not in the folder.
 
     Parameters
     ----------
     folder
-        Where they are kept.
+        The folder of the arrays.
 
     Returns
     -------
@@ -191,19 +191,19 @@ def read(folder: Path) -> list[Level]:
 
 
 def parameters(model: Model) -> int:
-    """Count what is estimated of a model: G in its smallest form, and what its loops see and drive.
+    """Return the number of estimated parameters of a model: of G in minimal form, and of its loops.
 
     Parameters
     ----------
     model
-        With loops around G or without.
+        A model with or without loops around G.
 
     Returns
     -------
     int
-        Of G ``n (inputs + outputs) + inputs outputs``, n its order: A has as many free numbers as the choice
-        of coordinates takes. Of each loop its drives, what it sees, its half-widths and weights, without
-        those that set its scales.
+        G of order n has ``n (inputs + outputs) + inputs outputs`` parameters, because the choice of the state
+        coordinates removes as many parameters as A has. The parameters of each loop are its input and output
+        vectors, its half-widths and its weights, without those that determine only a scale.
 
     Examples
     --------
@@ -223,26 +223,26 @@ def parameters(model: Model) -> int:
 
 
 def simulated(model: Model, u: Array) -> Array:
-    """Return the last period of what a model makes of two periods, (samples, outputs)."""
+    """Return the last period of the simulated output for two periods of the input, (samples, outputs)."""
     return np.asarray(model.simulate(u))[len(u) // 2 :]
 
 
 def relative_error(model: Model, level: Level, run: int = HELD_OUT) -> float:
-    """Return the error of a realisation as the benchmark counts it.
+    """Return the error of a realisation, as defined by the benchmark.
 
     Parameters
     ----------
     model
-        Runs free from the inputs alone.
+        The model, which is simulated from the inputs alone.
     level
         The amplitude.
     run
-        The realisation.
+        The number of the realisation.
 
     Returns
     -------
     float
-        Root mean square errors over root mean squares, each the mean of three outputs, in %.
+        The rms error over the rms output in %, where each rms is the mean over the three outputs.
 
     Examples
     --------
@@ -256,20 +256,20 @@ def relative_error(model: Model, level: Level, run: int = HELD_OUT) -> float:
 
 
 def frequency_response(level: Level, model: Model | None = None) -> tuple[Array, ComplexArray]:
-    """Estimate the response from three realisations, measured or of a model.
+    """Estimate the frequency response from three realisations, measured or simulated.
 
     Parameters
     ----------
     level
         The amplitude.
     model
-        What is simulated; the measurement itself when None.
+        The model that is simulated; None takes the measured outputs.
 
     Returns
     -------
     frequencies, response
-        In Hz up to 3 kHz, and (lines, outputs, inputs) in um/V: ``Y U^-1`` of the first three realisations,
-        whose phases make U orthogonal.
+        Frequencies in Hz up to 3 kHz, and the response in um/V, (lines, outputs, inputs). It is ``Y U^-1`` of
+        the first three realisations, whose phases make U orthogonal.
 
     Examples
     --------

@@ -1,16 +1,16 @@
-"""`gpi reproduce`: published examples and benchmarks, run again."""
+"""`gpi reproduce`: reproduce published examples and benchmarks."""
 
 import typer
 
 from gpi_hammerstein.cli.reproduce.paper import paper_command
 from gpi_hammerstein.cli.reproduce.steering_mirror import steering_mirror_command
 
-reproduce: typer.Typer = typer.Typer(no_args_is_help=True, help="Run published examples again.")
+reproduce: typer.Typer = typer.Typer(no_args_is_help=True, help="Reproduce published examples.")
 
 
 @reproduce.callback()
 def _examples() -> None:
-    """Run published examples again."""
+    """Reproduce published examples."""
 
 
 reproduce.command("paper")(paper_command)

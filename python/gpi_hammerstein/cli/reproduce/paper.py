@@ -1,4 +1,4 @@
-"""`gpi reproduce paper`: the source paper's example as numbers and pictures."""
+"""`gpi reproduce paper`: the example of the source paper, as numbers and pictures."""
 
 import textwrap
 from functools import partial
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 def paper_command(out: options.Out = None, as_json: options.Json = False) -> None:
     """Run the numerical example of the source paper, its figures 3 to 6.
 
-    Both readings of its equation (3) are run, and a third one in which thresholds act with both signs.
-    Writes paper.json and a picture for each figure and reading to DIR.
+    It is run with both deadzone conventions of equation (3), and with a third one in which thresholds act
+    with both signs. Writes paper.json and a picture for each figure and convention to DIR.
     """
     with working("running the paper's example"):
         found = paper()
@@ -39,8 +39,9 @@ def paper_command(out: options.Out = None, as_json: options.Json = False) -> Non
     screen.print()
     screen.print(refined_table(found))
     screen.print(
-        "Refined on the first 20 001 samples without noise. A dash: the record does not determine all play "
-        "weights; undetermined counts such combinations of parameters."
+        "The refinement uses the first 20 001 samples without noise. A dash means that the record does not "
+        "determine all play weights. `undetermined` is the number of unidentifiable combinations of "
+        "parameters."
     )
     screen.print()
     print(textwrap.fill(found.errata, 100))
@@ -48,7 +49,7 @@ def paper_command(out: options.Out = None, as_json: options.Json = False) -> Non
 
 
 def describe(found: Paper) -> dict[str, Any]:
-    """Return the numbers of the figures."""
+    """Return the numbers of the figures, for JSON."""
     return {
         "schema": "gpi-reproduction/1",
         "example": "paper",
@@ -98,7 +99,7 @@ def spread(estimate: Any, truth: Any) -> float:
 def summary_table(found: Paper) -> Table:
     """Return the table that the command prints."""
     table = Table(title="Relative errors after scaling", title_justify="left")
-    table.add_column("reading", min_width=11)
+    table.add_column("convention", min_width=11)
     for name in ("condition", "taps (Fig. 3)", "order", "G (Fig. 4)", "v (Fig. 5)", "v, sine (Fig. 6)"):
         table.add_column(name, justify="right", min_width=len("order") if name == "order" else 9)
     for reading in found.readings:
@@ -115,10 +116,12 @@ def summary_table(found: Paper) -> Table:
 
 
 def refined_table(found: Paper) -> Table:
-    """Return what the joint refinement makes of the example."""
-    table = Table(title="Refined jointly, order 3, true grids given", title_justify="left")
-    for name in ("reading", "G", "play weights", "deadzone weights", "undetermined"):
-        table.add_column(name, justify="left" if name == "reading" else "right", min_width=9)
+    """Return the table of the joint refinement."""
+    table = Table(
+        title="Joint refinement, order 3, with the true half-widths and thresholds", title_justify="left"
+    )
+    for name in ("convention", "G", "play weights", "deadzone weights", "undetermined"):
+        table.add_column(name, justify="left" if name == "convention" else "right", min_width=9)
     for reading in found.readings:
         refined = reading.refined
         known = np.isfinite(refined.weights_error)
@@ -133,7 +136,7 @@ def refined_table(found: Paper) -> Table:
 
 
 def draw(found: Paper, folder: Path) -> None:
-    """Draw every figure for every reading."""
+    """Draw every figure for every deadzone convention."""
     for reading in found.readings:
         name = reading.name.replace("-", "_")
         picture(folder / f"fig3_{name}.png", partial(figure_3, found=found, reading=reading))
@@ -151,7 +154,7 @@ def colours() -> tuple[str, ...]:
 
 
 def figure_3(ax: "Axes", found: Paper, reading: ReadingResult) -> None:
-    """Draw true and estimated Markov parameters."""
+    """Draw the true and the estimated Markov parameters."""
     blue, vermilion, *_ = colours()
     ax.plot(found.markov, "o", ms=6, mfc="none", color=blue, label="true")
     ax.plot(reading.markov, "x", ms=5, color=vermilion, label="estimated, scaled")
@@ -162,7 +165,7 @@ def figure_3(ax: "Axes", found: Paper, reading: ReadingResult) -> None:
 
 
 def figure_4(ax: "Axes", found: Paper, reading: ReadingResult) -> None:
-    """Draw the magnitude of true and identified G."""
+    """Draw the magnitudes of the true and the identified G."""
     blue, *others = colours()
     angles = np.linspace(1e-3, np.pi, 1000)
     truth = response(found.system, angles)
@@ -180,7 +183,7 @@ def figure_4(ax: "Axes", found: Paper, reading: ReadingResult) -> None:
 
 
 def figure_5(ax: "Axes", reading: ReadingResult) -> None:
-    """Draw v and v-hat of the record around a peak of its input."""
+    """Draw v and v-hat of the record around a peak of v."""
     blue, *others = colours()
     peak = int(np.argmax(np.abs(reading.v_multisine)))
     shown = slice(max(peak - 60, 0), peak + 60)

@@ -28,29 +28,30 @@ from gpi_hammerstein.reproduce.steering_mirror import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Around the resonance that moves most.
+# Frequencies in Hz around the resonance that moves most with the amplitude.
 SHOWN = (880.0, 1080.0)
 
 
 def steering_mirror_command(
     data: Annotated[
         Path | None,
-        typer.Option(help="Folder of the arrays; found, or fetched from their address.", metavar="DIR"),
+        typer.Option(help="Folder of the arrays. Default: the data folder, or a download.", metavar="DIR"),
     ] = None,
     levels: Annotated[
-        str, typer.Option(help="Amplitudes in mV that take part in the fit.", metavar="100,200,300")
+        str, typer.Option(help="Amplitudes in mV that are used for the fit.", metavar="100,200,300")
     ] = ",".join(map(str, LEVELS)),
-    order: Annotated[int, typer.Option(min=2, help="States of the linear part.")] = ORDER,
+    order: Annotated[int, typer.Option(min=2, help="Order (number of states) of the linear part.")] = ORDER,
     realisations: Annotated[
-        int, typer.Option(min=1, max=HELD_OUT, help="Realisations that take part in the fit.")
+        int, typer.Option(min=1, max=HELD_OUT, help="Number of realisations that are used for the fit.")
     ] = HELD_OUT,
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
-    """Find what a fast steering mirror's model lacks, next to the published models.
+    """Find the effects that the model of a fast steering mirror lacks, and compare with published models.
 
-    Three piezos, three displacements, three amplitudes; the last realisation of each amplitude takes no part.
-    Writes fsm.json, model.json and pictures of the frequency response at each amplitude to DIR.
+    The mirror has three piezos and three displacements, measured at three amplitudes. The last realisation of
+    each amplitude is held out. Writes fsm.json, model.json and pictures of the frequency response at each
+    amplitude to DIR.
     """
     chosen = options.parse_numbers("levels", levels)
     fitted = [int(level) for level in np.atleast_1d(np.asarray(chosen))]
@@ -77,7 +78,7 @@ def steering_mirror_command(
 
 
 def describe(mirror: SteeringMirror) -> dict[str, Any]:
-    """Return the errors of all models, and the explanation."""
+    """Return the errors of all models and the explanation, for JSON."""
     return {
         "schema": "gpi-reproduction/1",
         "example": "fsm",
@@ -119,7 +120,7 @@ def comparison(mirror: SteeringMirror) -> Table:
 
 
 def draw(mirror: SteeringMirror, folder: Path) -> None:
-    """Draw the frequency response at each amplitude, with the first model and with the last one."""
+    """Draw the frequency response at each amplitude, with the first and with the last model."""
     for name, stage in (("before", mirror.stages[0]), ("after", mirror.stages[-1])):
         title = f"{stage.name}: {stage.parameters} parameters for all amplitudes"
         part = partial(draw_responses, levels=mirror.levels, model=stage.model, title=title)

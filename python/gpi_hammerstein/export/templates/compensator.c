@@ -1,6 +1,6 @@
 /* $title, see $name.h.
  *
- * Compile without -ffast-math: it would take the check of the reference and what creep carries away.
+ * Compile without -ffast-math: it would remove the check of the reference and the correction of rounding errors of creep.
  */
 #include "$name.h"
 
@@ -14,27 +14,28 @@ typedef ${name}_real real;
 #define LAGS ${NAME}_LAGS
 @end
 
-/* v = (reference - offset - what creep adds) / gain */
+/* v = (reference - offset - creep) / gain */
 static const real offset = $offset;
 static const real gain = $gain;
 static const real standing_gain = $standing_gain;
 @creep
 
-/* Creep: each lag moves by rate (v - lag) a sample, and adds gain times its place. */
+/* Creep: in each sample, each lag changes by rate (v - lag). Its contribution to creep is gain times its value. */
 static const real lag_rates[LAGS] = {$lag_rates};
 static const real lag_gains[LAGS] = {$lag_gains};
 @end
 
-/* The inverse plays, from narrow to wide. */
+/* The inverse plays, by increasing half-width. */
 static const real half_widths[PLAYS] = {$half_widths};
 static const real weights[PLAYS] = {$weights};
 
-/* The inverse deadzones as a curve: knots, the drive at each, the slopes before the first one and behind each. */
+/* The inverse deadzones as a piecewise linear curve: knots, the drive at each knot, the slope before the first knot and after
+   each knot. */
 static const real knots[KNOTS] = {$knots};
 static const real heights[KNOTS] = {$heights};
 static const real slopes[KNOTS + 1] = {$slopes};
 
-/* The drive's limits, what goes into the deadzones there, and the v between which no limit is met. */
+/* The limits of the drive, the corresponding inputs of the inverse deadzones, and the range of v in which no limit is reached. */
 static const real lowest_drive = $lowest_drive;
 static const real highest_drive = $highest_drive;
 static const real lowest = $lowest;
@@ -67,7 +68,7 @@ static real fall(real *places, int i, real v)
     return weights[i] * places[i];
 }
 
-/* The first play, without width, stands at the last v: where v rises, no play falls. */
+/* The first play has no width and stores the last v. If v rises, no play moves down. */
 static real step_plays(real *places, real v)
 {
     real a = 0, b = 0, c = 0, d = 0;
@@ -113,7 +114,7 @@ static real drive_for(real z)
     }
 }
 
-/* The v that takes the plays from where they stand to an output. */
+/* Returns the v that moves the plays from their present state to an output. */
 static real input_for(const real *places, real output)
 {
     real v = places[0], reached = 0, slope = 0;
@@ -133,7 +134,7 @@ static real input_for(const real *places, real output)
     return slope > 0 ? v + (output - reached) / slope : v;
 }
 
-/* Moves the plays to v, or to what is within reach of it, and sets the drive. */
+/* Moves the plays to v, or to the nearest v that can be reached, and sets the drive. */
 static real move(${name}_state *state, real v)
 {
     if (v < safe_below || v > safe_above) {

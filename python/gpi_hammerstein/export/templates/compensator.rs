@@ -13,27 +13,28 @@ const KNOTS: usize = $knot_count;
 const LAGS: usize = $lags;
 @end
 
-// v = (reference - offset - what creep adds) / gain
+// v = (reference - offset - creep) / gain
 const OFFSET: Real = $offset;
 const GAIN: Real = $gain;
 const STANDING_GAIN: Real = $standing_gain;
 @creep
 
-// Creep: each lag moves by rate (v - lag) a sample, and adds gain times its place.
+// Creep: in each sample, each lag changes by rate (v - lag). Its contribution to creep is gain times its value.
 const LAG_RATES: [Real; LAGS] = [$lag_rates];
 const LAG_GAINS: [Real; LAGS] = [$lag_gains];
 @end
 
-// The inverse plays, from narrow to wide.
+// The inverse plays, by increasing half-width.
 const HALF_WIDTHS: [Real; PLAYS] = [$half_widths];
 const WEIGHTS: [Real; PLAYS] = [$weights];
 
-// The inverse deadzones as a curve: knots, the drive at each, the slopes before the first one and behind each.
+// The inverse deadzones as a piecewise linear curve: knots, the drive at each knot, the slope before the first knot and after
+// each knot.
 const KNOT_PLACES: [Real; KNOTS] = [$knots];
 const HEIGHTS: [Real; KNOTS] = [$heights];
 const SLOPES: [Real; KNOTS + 1] = [$slopes];
 
-// The drive's limits, what goes into the deadzones there, and the v between which no limit is met.
+// The limits of the drive, the corresponding inputs of the inverse deadzones, and the range of v in which no limit is reached.
 const LOWEST_DRIVE: Real = $lowest_drive;
 const HIGHEST_DRIVE: Real = $highest_drive;
 const LOWEST: Real = $lowest;
@@ -41,13 +42,13 @@ const HIGHEST: Real = $highest;
 const SAFE_BELOW: Real = $safe_below;
 const SAFE_ABOVE: Real = $safe_above;
 
-/// From a reference to the drive, and what has to be remembered between two samples.
+/// Computes the drive from a reference; contains the state between two samples.
 #[derive(Clone, Debug)]
 pub struct Compensator {
     plays: [Real; PLAYS],
 @creep
     lags: [Real; LAGS],
-    /// What rounding has taken from the lags.
+    /// Rounding errors of the lags.
     carried: [Real; LAGS],
 @end
     drive: Real,
@@ -55,7 +56,7 @@ pub struct Compensator {
 }
 
 impl Compensator {
-    /// An actuator that was brought from zero to this reference$output_unit long ago.
+    /// Returns the steady state after the actuator has moved from zero to this reference$output_unit.
     pub fn standing_at(reference: Real) -> Self {
 @creep
         let (lags, carried) = ([0.0; LAGS], [0.0; LAGS]);
@@ -70,7 +71,8 @@ impl Compensator {
         own
     }
 
-    /// The drive$input_unit for the next sample of the reference$output_unit; one that is not finite holds the drive.
+    /// Returns the drive$input_unit for the next sample of the reference$output_unit. If the reference is not finite, the drive
+    /// does not change.
     #[inline]
     pub fn step(&mut self, reference: Real) -> Real {
         if !reference.is_finite() {
@@ -94,12 +96,12 @@ impl Compensator {
         self.drive
     }
 
-    /// Samples at which the drive stood at a limit.
+    /// Returns the number of samples with the drive at a limit.
     pub fn out_of_reach(&self) -> u32 {
         self.out_of_reach
     }
 
-    /// Moves the plays to v, or to what is within reach of it, and sets the drive.
+    /// Moves the plays to v, or to the nearest v that can be reached, and sets the drive.
     #[inline]
     fn go_to(&mut self, v: Real) -> Real {
         if !(SAFE_BELOW..=SAFE_ABOVE).contains(&v) {
@@ -133,7 +135,7 @@ fn clamp(value: Real, low: Real, high: Real) -> Real {
     if low > value { low } else { value }
 }
 
-/// The first play, without width, stands at the last v: where v rises, no play falls.
+/// The first play has no width and stores the last v. If v rises, no play moves down.
 #[inline]
 fn step_plays(places: &mut [Real; PLAYS], v: Real) -> Real {
     if v > places[0] {
@@ -158,7 +160,7 @@ fn drive_for(z: Real) -> Real {
     clamp(HEIGHTS[j] + SLOPES[j + usize::from(passed > 0)] * (z - KNOT_PLACES[j]), LOWEST_DRIVE, HIGHEST_DRIVE)
 }
 
-/// Four sums side by side do not wait for each other.
+/// Adds the terms in four independent sums, which the processor can compute in parallel.
 #[inline]
 fn sum(count: usize, mut term: impl FnMut(usize) -> Real) -> Real {
     let mut sums = [0.0; 4];
@@ -174,7 +176,7 @@ fn sum(count: usize, mut term: impl FnMut(usize) -> Real) -> Real {
     (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
-/// The v that takes the plays from where they stand to an output.
+/// Returns the v that moves the plays from their present state to an output.
 fn input_for(places: &[Real; PLAYS], output: Real) -> Real {
     let (mut v, mut reached, mut slope) = (places[0], 0.0, 0.0);
     for i in 0..PLAYS {
