@@ -16,9 +16,9 @@ pub(super) struct Weights {
 const BLOCK: usize = 4;
 
 impl Weights {
-    pub(super) fn new(rows: &[&[f64]]) -> Self {
-        let columns = rows.first().map_or(0, |row| row.len());
-        let block = |rows: &[&[f64]]| {
+    pub(super) fn new(rows: &[Vec<f64>]) -> Self {
+        let columns = rows.first().map_or(0, Vec::len);
+        let block = |rows: &[Vec<f64>]| {
             let column = |j: usize| std::array::from_fn(|i| rows.get(i).map_or(0.0, |row| row[j]));
             (0..columns).map(column).collect()
         };

@@ -22,3 +22,4 @@ mod stages;
 pub(crate) mod stream;
 pub(crate) mod table;
 pub(crate) mod tangents;
+mod tiles;

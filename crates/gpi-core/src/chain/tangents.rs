@@ -1,10 +1,11 @@
 //! Derivatives by all unknowns, taken through G, its loops and the output stage side by side.
 
-use super::injections::{Injection, Places, Signals, injections};
-use super::lanes::{LANES, Lanes, NONE, Weights, add};
+use super::injections::{Places, Signals, injections};
+use super::lanes::{LANES, NONE, Weights, add};
 use super::motion::{advance_tangent, columns, rows};
 use super::point::Point;
 use super::table::{Group, Table};
+use super::tiles::{Shape, Tile, tiles};
 use crate::effects::{InnerLoop, OutputStage, Sees, Slope};
 use crate::linear::Section;
 use crate::{Experiment, Matrix};
@@ -48,27 +49,6 @@ pub(crate) struct Tangents<'a> {
     tiles: Vec<Tile>,
 }
 
-/// Some unknowns beside each other.
-struct Tile {
-    first: usize,
-    injections: Vec<Injection>,
-    /// Unknowns that start as a state, and that state.
-    starts: Vec<(usize, usize)>,
-    /// Whether v changes.
-    drives: bool,
-    /// Sections and their states that change.
-    sections: Range<usize>,
-    states: Range<usize>,
-    x: Vec<Lanes>,
-    /// Changes that each effect of the output stage holds.
-    held: Vec<Lanes>,
-    /// Changes of the places of each loop's plays.
-    plays: Vec<Lanes>,
-    work: Vec<Lanes>,
-    /// Of each output, by scored samples.
-    rows: Vec<Vec<Lanes>>,
-}
-
 impl<'a> Tangents<'a> {
     pub(crate) fn new(
         point: &'a Point,
@@ -78,67 +58,34 @@ impl<'a> Tangents<'a> {
         index: usize,
     ) -> Self {
         let places = Places::new(point);
-        let dynamics = &point.dynamics;
-        let all_sections = point.sections();
-        let mut all = injections(point, table, index, &signals, &places).into_iter().peekable();
+        let (dynamics, sections) = (&point.dynamics, point.sections());
         let loops: Vec<&InnerLoop> = point.loops().collect();
-        let plays = loops.iter().map(|inner| inner.law.stops()).sum();
         let sensed = sensed(point);
-        let start = table.range(Group::State { experiment: index });
-        let tile = |first: usize| {
-            let own = first..table.len.min(first + LANES);
-            let injections: Vec<Injection> =
-                std::iter::from_fn(|| all.next_if(|one| own.contains(&one.unknown))).collect();
-            let starts: Vec<(usize, usize)> = start
-                .clone()
-                .filter(|unknown| own.contains(unknown))
-                .map(|unknown| (unknown - first, unknown - start.start))
-                .collect();
-            let drives = injections.iter().any(|one| places.v.contains(&one.place));
-            // without a loop a section moves nothing but itself
-            let everything = drives || !loops.is_empty();
-            let entered = injections.iter().filter(|one| places.states.contains(&one.place));
-            let entered = entered.map(|one| one.place - places.states.start);
-            let moved: Vec<usize> = entered.chain(starts.iter().map(|(_, state)| *state)).collect();
-            let (sections, states) = moving(&all_sections, &moved, everything);
-            Tile {
-                first,
-                injections,
-                starts,
-                drives,
-                sections,
-                states,
-                x: vec![NONE; point.order()],
-                held: vec![NONE; sensed.len()],
-                plays: vec![NONE; plays],
-                work: vec![NONE; places.len],
-                rows: vec![Vec::new(); dynamics.outputs()],
-            }
-        };
-        let tiles: Vec<Tile> = (0..table.len).step_by(LANES).map(tile).collect();
-        let (c, b) =
-            (rows(&all_sections, dynamics.outputs()), columns(&all_sections, dynamics.inputs()));
-        let none = vec![0.0; point.order()];
-        let sees = |inner: &&'a InnerLoop| match &inner.sees {
-            Sees::Output(_) => &none[..],
-            Sees::Mixture { states, .. } => states,
-        };
-        let weights =
-            |rows: &[Vec<f64>]| Weights::new(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>());
-        let seen = c.iter().map(Vec::as_slice).chain(loops.iter().map(sees));
-        let drives: Vec<&[f64]> = loops.iter().map(|inner| &inner.drives[..]).collect();
+        let injections = injections(point, table, index, &signals, &places);
+        let starts = table.range(Group::State { experiment: index });
+        let shape =
+            Shape { places: &places, sections: &sections, loops: &loops, sensed: sensed.len() };
+        let tiles = tiles(&shape, injections, starts, table.len);
+        let order = point.order();
+        let mut seen = rows(&sections, dynamics.outputs());
+        seen.extend(loops.iter().map(|inner| match &inner.sees {
+            Sees::Output(_) => vec![0.0; order],
+            Sees::Mixture { states, .. } => padded(states, order),
+        }));
+        let drives: Vec<Vec<f64>> =
+            loops.iter().map(|inner| padded(&inner.drives, order)).collect();
         Self {
-            seen: Weights::new(&seen.collect::<Vec<_>>()),
-            driven: weights(&b),
+            seen: Weights::new(&seen),
+            driven: Weights::new(&columns(&sections, dynamics.inputs())),
             circulating: Weights::new(&drives),
             d: &dynamics.d,
             loops,
-            tiles: tiles.into_iter().filter(Tile::is_active).collect(),
+            tiles,
             sensed,
             signals,
             places,
             warmup: experiment.warmup,
-            sections: all_sections,
+            sections,
         }
     }
 
@@ -295,12 +242,6 @@ impl pulp::WithSimd for Advance<'_, '_> {
     }
 }
 
-impl Tile {
-    fn is_active(&self) -> bool {
-        !self.injections.is_empty() || !self.starts.is_empty()
-    }
-}
-
 /// The output that each effect of the output stage acts on, in the order in which they act.
 pub(super) fn sensed(point: &Point) -> Vec<usize> {
     let mut sensed: Vec<usize> = point.output_stages().map(OutputStage::output).collect();
@@ -308,19 +249,9 @@ pub(super) fn sensed(point: &Point) -> Vec<usize> {
     sensed
 }
 
-/// The range of sections that holds the states `moved`, or all, and the range of its states.
-fn moving(sections: &[Section], moved: &[usize], all: bool) -> (Range<usize>, Range<usize>) {
-    let mut found: Option<(Range<usize>, Range<usize>)> = None;
-    let mut first = 0;
-    for (place, section) in sections.iter().enumerate() {
-        let own = first..first + section.order();
-        if all || moved.iter().any(|state| own.contains(state)) {
-            found = Some(match found {
-                Some((sections, states)) => (sections.start..place + 1, states.start..own.end),
-                None => (place..place + 1, own.clone()),
-            });
-        }
-        first = own.end;
-    }
-    found.unwrap_or((0..0, 0..0))
+/// Values for the states of G, with zeros for those of sections in parallel.
+fn padded(values: &[f64], order: usize) -> Vec<f64> {
+    let mut all = values.to_vec();
+    all.resize(order, 0.0);
+    all
 }

@@ -1,0 +1,97 @@
+//! Unknowns in groups that fill the processor's vectors.
+
+use super::injections::{Injection, Places};
+use super::lanes::{LANES, Lanes, NONE};
+use crate::effects::InnerLoop;
+use crate::linear::Section;
+use std::ops::Range;
+
+/// Some unknowns side by side, and their changes.
+pub(super) struct Tile {
+    pub first: usize,
+    pub injections: Vec<Injection>,
+    /// Unknowns that start as a state, and that state.
+    pub starts: Vec<(usize, usize)>,
+    /// Whether v changes.
+    pub drives: bool,
+    /// Sections and their states that change.
+    pub sections: Range<usize>,
+    pub states: Range<usize>,
+    pub x: Vec<Lanes>,
+    /// Changes that each effect of the output stage holds.
+    pub held: Vec<Lanes>,
+    /// Changes of the places of each loop's plays.
+    pub plays: Vec<Lanes>,
+    pub work: Vec<Lanes>,
+    /// Of each output, by scored samples.
+    pub rows: Vec<Vec<Lanes>>,
+}
+
+/// What the tiles of an experiment have in common.
+pub(super) struct Shape<'a> {
+    pub places: &'a Places,
+    pub sections: &'a [Section],
+    pub loops: &'a [&'a InnerLoop],
+    /// Effects of the output stage.
+    pub sensed: usize,
+}
+
+/// The tiles of so many unknowns that have an injection, or are one of the initial states `starts`.
+pub(super) fn tiles(
+    shape: &Shape,
+    injections: Vec<Injection>,
+    starts: Range<usize>,
+    unknowns: usize,
+) -> Vec<Tile> {
+    let Shape { places, sections, loops, sensed } = shape;
+    let mut all = injections.into_iter().peekable();
+    let tile = |first: usize| {
+        let own = first..unknowns.min(first + LANES);
+        let injections: Vec<Injection> =
+            std::iter::from_fn(|| all.next_if(|one| own.contains(&one.unknown))).collect();
+        let starts: Vec<(usize, usize)> = starts
+            .clone()
+            .filter(|unknown| own.contains(unknown))
+            .map(|unknown| (unknown - first, unknown - starts.start))
+            .collect();
+        let drives = injections.iter().any(|one| places.v.contains(&one.place));
+        // without a loop a section moves nothing but itself
+        let everything = drives || !loops.is_empty();
+        let entered = injections.iter().filter(|one| places.states.contains(&one.place));
+        let entered = entered.map(|one| one.place - places.states.start);
+        let moved: Vec<usize> = entered.chain(starts.iter().map(|(_, state)| *state)).collect();
+        let (sections, states) = moving(sections, &moved, everything);
+        Tile {
+            first,
+            injections,
+            starts,
+            drives,
+            sections,
+            states,
+            x: vec![NONE; places.states.len()],
+            held: vec![NONE; *sensed],
+            plays: vec![NONE; loops.iter().map(|inner| inner.law.stops()).sum()],
+            work: vec![NONE; places.len],
+            rows: vec![Vec::new(); places.y.len()],
+        }
+    };
+    let is_active = |tile: &Tile| !tile.injections.is_empty() || !tile.starts.is_empty();
+    (0..unknowns).step_by(LANES).map(tile).filter(is_active).collect()
+}
+
+/// The range of sections that holds the states `moved`, or all, and the range of its states.
+fn moving(sections: &[Section], moved: &[usize], all: bool) -> (Range<usize>, Range<usize>) {
+    let mut found: Option<(Range<usize>, Range<usize>)> = None;
+    let mut first = 0;
+    for (place, section) in sections.iter().enumerate() {
+        let own = first..first + section.order();
+        if all || moved.iter().any(|state| own.contains(state)) {
+            found = Some(match found {
+                Some((sections, states)) => (sections.start..place + 1, states.start..own.end),
+                None => (place..place + 1, own.clone()),
+            });
+        }
+        first = own.end;
+    }
+    found.unwrap_or((0..0, 0..0))
+}
