@@ -5,7 +5,7 @@
 //! Reference: y in um.
 //! Drive: u in V, from -120 to 120 V.
 //! Undone: hysteresis, creep.
-//! Left: dynamics: of G only the DC gain is undone.
+//! Left: dynamics: only the DC gain of G is inverted.
 //! Made by gpi-hammerstein 0.1.0, `gpi export`.
 
 #![forbid(unsafe_code)]
