@@ -5,7 +5,7 @@
  * Reference: y in um.
  * Drive: u in V, from -120 to 120 V.
  * Compensated: hysteresis, creep.
- * Not compensated: dynamics: of G only the DC gain is undone.
+ * Not compensated: dynamics: only the DC gain of G is inverted.
  * Made by gpi-hammerstein 0.1.0, `gpi export`.
  */
 #ifndef GPI_COMPENSATOR_H

@@ -246,7 +246,7 @@ def bad_record(kind: str, folder: Path) -> Path:
         ("empty", [], ("empty",)),
         ("lengths", [], ("`u` has 50", "`y` has 49")),
         ("short", [], ("6 usable samples", "35 are needed")),
-        ("sine", ["--taps", "31"], ("31 taps", "excites")),
+        ("sine", ["--taps", "31"], ("31 taps", "persistently exciting")),
     ],
 )
 def test_unusable_data_are_refused_and_nothing_is_written(

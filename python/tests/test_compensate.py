@@ -60,7 +60,7 @@ def test_what_the_input_drives_is_compensated(name):
 def test_the_drive_stays_below_what_the_amplifier_can():
     parameters, place = CASES["amplifier-slew"]
     found = with_effect(model_of(plant()), name="amplifier-slew", **parameters).compensate(reference())
-    assert found.left == [("amplifier-slew", "the drive is kept below its limit instead")]
+    assert found.left == [("amplifier-slew", "the slope of the drive is kept below its limit instead")]
     assert found.too_fast > 0
     assert np.max(np.abs(np.diff(found.drive))) <= parameters["limit"] / RATE * (1 + 1e-12)
     np.testing.assert_allclose(reached(found, **place), found.predicted[found.lead :], rtol=0, atol=1e-11)

@@ -12,7 +12,7 @@ from test_effects import CASES, lag, plant, with_effect
 
 CREEP = CASES["creep"][0]
 LAGS = list(zip(CREEP["gains"], CREEP["time_constants"], strict=True))
-STILL = "of G only the DC gain is undone"
+STILL = "only the DC gain of G is inverted"
 
 
 def creeping():
@@ -78,8 +78,8 @@ def test_what_is_missing_holds_the_drive():
     ("name", "why"),
     [
         ("drift", "the input does not drive it"),
-        ("delay", "it is undone where the reference is known beforehand"),
-        ("linear-dynamics", "of its dynamics only the DC gain is undone"),
+        ("delay", "it is compensated only if the reference is known in advance"),
+        ("linear-dynamics", "only the DC gain of its dynamics is inverted"),
     ],
 )
 def test_what_it_leaves_is_said(name, why):

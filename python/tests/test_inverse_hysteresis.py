@@ -93,7 +93,7 @@ def test_what_has_no_inverse_is_refused(deadzones, plays, limits, message):
 
 
 def test_states_that_no_input_brings_about_are_refused(cascade):
-    with pytest.raises(gpi.ParameterError, match="play 1 stands 5 from the next narrower one"):
+    with pytest.raises(gpi.ParameterError, match="the output of play 1 differs by 5 from that of the next narrower play"):
         cascade.inverse_state([0.0, 0.0, 5.0, 0.0, 0.0])
     with pytest.raises(gpi.ParameterError, match="`state` has 2 elements, but 5 are needed"):
         cascade.inverse().run([1.0], [0.0, 0.0])

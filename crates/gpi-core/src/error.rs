@@ -1,19 +1,20 @@
-//! The one error type of the identification: what is wrong, where, both numbers, and what to do.
+//! The error type of the library. Every message states what is wrong, where, the numbers, and what to do.
 
+use crate::Matrix;
 use crate::operators::OperatorError;
 
-/// Who has to act on an [`Error`]; the command line maps it to its exit code.
+/// The cause of an [`Error`]; the command line maps it to its exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// The call is wrong: a parameter is out of its range.
+    /// A parameter is out of its range.
     Parameter,
-    /// The data cannot be used for what was asked.
+    /// The data cannot be used for the requested computation.
     Data,
-    /// The data are usable, but the numbers they lead to are not.
+    /// The data are usable, but a numerical result is not.
     Numerical,
 }
 
-/// Why something was refused.
+/// Errors of the library.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -22,13 +23,13 @@ pub enum Error {
     Parameter {
         /// The parameter's name.
         name: &'static str,
-        /// The value that was given.
+        /// The given value.
         value: String,
-        /// What it must be.
+        /// The requirement that the value violates.
         requirement: String,
     },
 
-    /// An operator refuses its parameters.
+    /// An operator rejects its parameters.
     #[error(transparent)]
     Operator(#[from] OperatorError),
 
@@ -40,16 +41,16 @@ pub enum Error {
     NotFinite {
         /// The column's name.
         column: String,
-        /// The first such row, from 0.
+        /// The first row with such a sample, from 0.
         row: usize,
-        /// How many there are.
+        /// Number of such samples.
         count: usize,
     },
 
     /// Arrays that belong together differ in size.
     #[error("`{left}` has {left_size} {what}, but `{right}` has {right_size}; they must be equal")]
     Mismatch {
-        /// What is counted, in the plural.
+        /// Name of the counted elements, in the plural.
         what: &'static str,
         /// Name of the first array.
         left: String,
@@ -64,18 +65,18 @@ pub enum Error {
     /// Not enough samples for the number of unknowns.
     #[error(
         "{samples} usable samples, but {needed} are needed ({purpose}); \
-         record longer or ask for less"
+         record more samples or reduce what is estimated"
     )]
     TooFewSamples {
-        /// Samples that can be used.
+        /// Number of usable samples.
         samples: usize,
-        /// Samples that are needed.
+        /// Number of samples needed.
         needed: usize,
-        /// What they are needed for.
+        /// The purpose for which they are needed.
         purpose: String,
     },
 
-    /// A column never changes.
+    /// A column is constant.
     #[error("column `{column}` is constant at {value}; a system cannot be identified from it")]
     Constant {
         /// The column's name.
@@ -84,23 +85,23 @@ pub enum Error {
         value: f64,
     },
 
-    /// The input does not excite the taps that were asked for.
+    /// The input is not persistently exciting of the order that the requested number of taps needs.
     #[error(
-        "the input excites {rank} of the {unknowns} unknowns of {taps} taps; \
-         ask for at most {supported} taps or excite more frequencies"
+        "{taps} taps have {unknowns} unknowns, but the input is persistently exciting of order {rank} only; \
+         use at most {supported} taps or excite more frequencies"
     )]
     Excitation {
-        /// Taps that were asked for.
+        /// The requested number of taps.
         taps: usize,
         /// Unknowns of the regression: taps times inputs.
         unknowns: usize,
-        /// Numerical rank of the regressor.
+        /// Numerical rank of the regressor, the order of persistent excitation.
         rank: usize,
-        /// The largest number of taps that the input excites.
+        /// The largest number of taps for which the excitation suffices.
         supported: usize,
     },
 
-    /// The clock runs backwards or stands still.
+    /// Time stamps decrease or repeat.
     #[error(
         "time stamps do not increase at {count} of the rows, first from {before} s in row {row} to \
          {after} s in the next; sort or cut the record there"
@@ -108,29 +109,29 @@ pub enum Error {
     TimeNotIncreasing {
         /// Row before the first step that does not increase, from 0.
         row: usize,
-        /// Its time.
+        /// Its time in s.
         before: f64,
-        /// The time of the next row.
+        /// The time of the next row in s.
         after: f64,
-        /// How many such steps there are.
+        /// Number of such steps.
         count: usize,
     },
 
     /// Samples are missing.
     #[error(
         "the time stamps have {count} gaps, the first of {gap} s after row {row} (t = {time} s, \
-         usual step {step} s); resample the record or cut it there"
+         median step {step} s); resample the record or cut it there"
     )]
     TimeGap {
         /// Row before the first gap, from 0.
         row: usize,
-        /// Its time.
+        /// Its time in s.
         time: f64,
-        /// The step across the gap.
+        /// The step across the gap in s.
         gap: f64,
-        /// The usual step.
+        /// The median step in s.
         step: f64,
-        /// How many gaps there are.
+        /// Number of gaps.
         count: usize,
     },
 
@@ -142,11 +143,11 @@ pub enum Error {
     TimeNotUniform {
         /// Row before the first deviating step, from 0.
         row: usize,
-        /// The shortest step.
+        /// The shortest step in s.
         shortest: f64,
-        /// The longest step.
+        /// The longest step in s.
         longest: f64,
-        /// The median step.
+        /// The median step in s.
         median: f64,
     },
 
@@ -155,26 +156,25 @@ pub enum Error {
     Unstable {
         /// The largest modulus of a pole.
         modulus: f64,
-        /// What to do about it.
+        /// The remedy.
         remedy: &'static str,
     },
 
-    /// A system cannot be run backwards.
+    /// A linear model has no stable inverse.
     #[error(
         "the linear model has a zero on the unit circle (distance {distance} at {frequency} rad per \
-         sample, tolerance {tolerance}); its inverse does not exist there: leave the dynamics alone \
-         (`quasi_static`), or identify with another `order`"
+         sample, tolerance {tolerance}); its inverse does not exist: invert the DC gain only (`quasi_static`), or identify with another `order`"
     )]
     ZeroOnUnitCircle {
-        /// Distance of the zero from the circle.
+        /// Distance of the zero from the unit circle.
         distance: f64,
-        /// Angle of the zero.
+        /// Angle of the zero in rad per sample.
         frequency: f64,
-        /// The least distance that is accepted.
+        /// The smallest accepted distance.
         tolerance: f64,
     },
 
-    /// The caller's progress function asked to stop.
+    /// The caller's progress function requested a stop.
     #[error("stopped on request")]
     Interrupted,
 
@@ -189,25 +189,25 @@ pub enum Error {
         columns: usize,
     },
 
-    /// A file is of a schema that this version does not know.
+    /// The schema of a file is unknown to this version.
     #[error("schema `{found}` is not known; this version reads `{expected}`")]
     Schema {
         /// The schema in the file.
         found: String,
-        /// The schema that is read.
+        /// The schema that this version reads.
         expected: &'static str,
     },
 
-    /// A model file cannot be understood.
+    /// A model file cannot be read.
     #[error("not a model file: {reason}")]
     ModelFile {
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
 }
 
 impl Error {
-    /// Who has to act.
+    /// The cause of the error.
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::Parameter { .. } | Self::Operator(_) => ErrorKind::Parameter,
@@ -227,7 +227,50 @@ impl Error {
         Self::Parameter { name, value: value.to_string(), requirement: requirement.into() }
     }
 
-    /// Refuses arrays of different size.
+    /// Rejects a value that violates a requirement.
+    pub(crate) fn require(
+        holds: bool,
+        name: &'static str,
+        value: impl ToString,
+        requirement: impl Into<String>,
+    ) -> Result<(), Self> {
+        if holds { Ok(()) } else { Err(Self::parameter(name, value, requirement)) }
+    }
+
+    /// Rejects a value that is not a positive finite number.
+    pub(crate) fn require_positive(
+        name: &'static str,
+        value: f64,
+        requirement: &str,
+    ) -> Result<(), Self> {
+        Self::require(value.is_finite() && value > 0.0, name, value, requirement)
+    }
+
+    /// Rejects a matrix with NaN or infinite elements.
+    pub(crate) fn require_finite(name: &'static str, matrix: &Matrix) -> Result<(), Self> {
+        let is_other = |value: &&f64| !value.is_finite();
+        // counted first: a count vectorizes, a search does not
+        if matrix.as_slice().iter().filter(is_other).count() > 0
+            && let Some(value) = matrix.iter().find(is_other)
+        {
+            return Err(Self::parameter(name, value, "every element must be finite"));
+        }
+        Ok(())
+    }
+
+    /// Rejects fewer samples than `needed` for a purpose.
+    pub(crate) fn require_samples(
+        samples: usize,
+        needed: usize,
+        purpose: impl Into<String>,
+    ) -> Result<(), Self> {
+        if samples >= needed {
+            return Ok(());
+        }
+        Err(Self::TooFewSamples { samples, needed, purpose: purpose.into() })
+    }
+
+    /// Rejects arrays of different size.
     pub(crate) fn require_equal(
         what: &'static str,
         (left, left_size): (&str, usize),

@@ -1,13 +1,17 @@
-//! Input signals that show what an actuator does: multisine, binary noise, decaying triangle, held steps.
+//! Excitation signals for experiments: multisine, pseudo-random binary signal, decaying triangle, held steps.
 //!
-//! Every generator returns one value per sample within `range`, in the unit of the drive, and limits
-//! the slope to `slew` units per second when one is given.
+//! Every generator returns one value per sample within `range`, in the unit of the drive, and limits the slope to `slew`
+//! units per second if it is given.
 
 use crate::Error;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// What all excitation signals share.
+/// A frequency may miss a grid point by this fraction of a grid step and still count as on it: far above the rounding of
+/// the quotient of two frequencies, and far below a step.
+const ON_GRID: f64 = 1e-9;
+
+/// Parameters that all excitation signals share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
     /// Number of samples.
@@ -16,49 +20,36 @@ pub struct Drive {
     pub rate: f64,
     /// Smallest and largest value, in the unit of the drive.
     pub range: (f64, f64),
-    /// Largest slope in units per second, unlimited when `None`.
+    /// Largest slope in units per second; unlimited if `None`.
     pub slew: Option<f64>,
 }
 
-/// Which lines of a [`multisine`] are excited.
+/// The excited frequency lines of a [`multisine`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Lines {
     /// Every line in the band.
     #[default]
     All,
-    /// Odd multiples of the period's frequency: even nonlinearities show on the even lines.
+    /// Odd multiples of the fundamental frequency: even nonlinearities then appear on the even lines.
     Odd,
-    /// Odd lines, of which one in every four consecutive ones is left out at random: odd
-    /// nonlinearities show on those.
+    /// Odd lines without one line in each group of four, chosen at random: odd nonlinearities then appear on the lines
+    /// that are left out.
     OddWithDetection,
 }
 
 impl Drive {
     fn validate(&self) -> Result<(), Error> {
-        if self.samples < 2 {
-            return Err(Error::parameter("samples", self.samples, "at least 2 are needed"));
-        }
-        if !(self.rate.is_finite() && self.rate > 0.0) {
-            return Err(Error::parameter("rate", self.rate, "the rate in Hz must be positive"));
-        }
+        Error::require(self.samples >= 2, "samples", self.samples, "at least 2 are needed")?;
+        Error::require_positive("rate", self.rate, "the rate in Hz must be positive")?;
         let (low, high) = self.range;
-        if !(low.is_finite() && high.is_finite() && low < high) {
-            let value = format!("({low}, {high})");
-            return Err(Error::parameter(
-                "range",
-                value,
-                "its first value must be the smaller one",
-            ));
-        }
-        match self.slew {
-            Some(slew) if !(slew.is_finite() && slew > 0.0) => {
-                Err(Error::parameter("slew", slew, "the slope limit must be positive"))
-            }
-            _ => Ok(()),
-        }
+        let rises = low.is_finite() && high.is_finite() && low < high;
+        let requirement = "its first value must be the smaller one";
+        Error::require(rises, "range", format!("({low}, {high})"), requirement)?;
+        let slew = self.slew.unwrap_or(1.0);
+        Error::require_positive("slew", slew, "the slope limit must be positive")
     }
 
-    /// Stretches a signal to the range, then limits its slope.
+    /// Scales a signal to the range, then limits its slope.
     fn fit(&self, mut signal: Vec<f64>) -> Vec<f64> {
         let low = signal.iter().copied().fold(f64::INFINITY, f64::min);
         let high = signal.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -66,27 +57,26 @@ impl Drive {
         for value in &mut signal {
             *value = bottom + (top - bottom) * (*value - low) / (high - low);
         }
-        if let Some(slew) = self.slew {
-            limit_slope(&mut signal, slew / self.rate);
+        self.limited(signal)
+    }
+
+    /// The signal with its slope limited to `slew`.
+    fn limited(&self, mut signal: Vec<f64>) -> Vec<f64> {
+        if let (Some(slew), Some(&first)) = (self.slew, signal.first()) {
+            let (step, mut previous) = (slew / self.rate, first);
+            for value in &mut signal {
+                *value = value.clamp(previous - step, previous + step);
+                previous = *value;
+            }
         }
         signal
     }
 }
 
-/// Lets the signal change by at most `step` a sample.
-fn limit_slope(signal: &mut [f64], step: f64) {
-    let Some(&first) = signal.first() else { return };
-    let mut previous = first;
-    for value in signal {
-        *value = value.clamp(previous - step, previous + step);
-        previous = *value;
-    }
-}
-
-/// A random-phase multisine: one period of `samples`, flat amplitude on the lines of `band` (Hz).
+/// A random-phase multisine: one period of `samples`, with equal amplitudes on the lines of `band` (Hz).
 ///
-/// `u(k) = sum_l cos(2 pi l k / samples + phi_l)` with phases uniform in [0, 2 pi), stretched to the
-/// range. It is periodic in its length. A slew limit clips slopes and so adds harmonics.
+/// `u(k) = sum_l cos(2 pi l k / samples + phi_l)` with phases uniform in [0, 2 pi), scaled to the range. Its period is
+/// its length. A slew limit clips slopes and thereby adds harmonics.
 ///
 /// ```
 /// use gpi_core::excitation::{Drive, Lines, multisine};
@@ -97,7 +87,7 @@ fn limit_slope(signal: &mut [f64], step: f64) {
 /// ```
 ///
 /// # Errors
-/// A parameter out of its range, a band without a line.
+/// A parameter is out of its range, or the band holds no line.
 pub fn multisine(
     drive: &Drive,
     band: (f64, f64),
@@ -107,13 +97,12 @@ pub fn multisine(
     drive.validate()?;
     let (low, high) = band;
     let nyquist = drive.rate / 2.0;
-    if !(low >= 0.0 && low <= high && high < nyquist) {
-        let requirement = format!("must rise and lie between 0 and {nyquist} Hz");
-        return Err(Error::parameter("band", format!("({low}, {high})"), requirement));
-    }
+    let is_band = low >= 0.0 && low <= high && high < nyquist;
+    let requirement = format!("must rise and lie between 0 and {nyquist} Hz");
+    Error::require(is_band, "band", format!("({low}, {high})"), requirement)?;
     let spacing = drive.rate / drive.samples as f64;
-    let first = ((low / spacing - 1e-9).ceil() as usize).max(1);
-    let last = (high / spacing + 1e-9).floor() as usize;
+    let first = ((low / spacing - ON_GRID).ceil() as usize).max(1);
+    let last = (high / spacing + ON_GRID).floor() as usize;
     let mut noise = Noise::new(seed);
     let mut spectrum = vec![Complex64::new(0.0, 0.0); drive.samples];
     let (mut excited, mut odd, mut skipped) = (0, 0, 0);
@@ -132,31 +121,34 @@ pub fn multisine(
         spectrum[line] = Complex64::from_polar(1.0, TAU * noise.uniform());
         excited += 1;
     }
-    if excited == 0 {
-        let requirement = format!("no line in it; lines lie {spacing} Hz apart");
-        return Err(Error::parameter("band", format!("({low}, {high})"), requirement));
-    }
+    let requirement = format!("no line in it; the lines are {spacing} Hz apart");
+    Error::require(excited > 0, "band", format!("({low}, {high})"), requirement)?;
     rustfft::FftPlanner::new().plan_fft_inverse(drive.samples).process(&mut spectrum);
     Ok(drive.fit(spectrum.iter().map(|value| value.re).collect()))
 }
 
 /// A pseudo-random binary signal that may switch every `1 / clock` seconds (clock in Hz).
 ///
-/// The bits are those of a maximum length shift register of 31 stages.
+/// The bits are those of a maximum-length shift register of 31 bits.
+///
+/// ```
+/// use gpi_core::excitation::{Drive, prbs};
+/// let drive = Drive { samples: 1000, rate: 1000.0, range: (0.0, 10.0), slew: None };
+/// assert!(prbs(&drive, 100.0, 7)?.iter().all(|&value| value == 0.0 || value == 10.0));
+/// # Ok::<(), gpi_core::Error>(())
+/// ```
 ///
 /// # Errors
-/// A parameter out of its range, a record too short for the signal to switch.
+/// A parameter is out of its range, or there are too few samples for the signal to switch.
 pub fn prbs(drive: &Drive, clock: f64, seed: u64) -> Result<Vec<f64>, Error> {
     drive.validate()?;
-    if !(clock > 0.0 && clock <= drive.rate) {
-        let requirement = format!("must lie between 0 and the rate, {} Hz", drive.rate);
-        return Err(Error::parameter("clock", clock, requirement));
-    }
+    let requirement = format!("must lie between 0 and the rate, {} Hz", drive.rate);
+    Error::require(clock > 0.0 && clock <= drive.rate, "clock", clock, requirement)?;
     let mut register = (Noise::new(seed).next() as u32 & 0x7fff_ffff).max(1);
     let mut bits = Vec::new();
     let signal: Vec<f64> = (0..drive.samples)
         .map(|k| {
-            let index = (k as f64 * clock / drive.rate + 1e-9) as usize;
+            let index = (k as f64 * clock / drive.rate + ON_GRID) as usize;
             while bits.len() <= index {
                 // x^31 + x^28 + 1 is primitive: the sequence repeats after 2^31 - 1 bits.
                 let bit = ((register >> 30) ^ (register >> 27)) & 1;
@@ -166,32 +158,35 @@ pub fn prbs(drive: &Drive, clock: f64, seed: u64) -> Result<Vec<f64>, Error> {
             bits[index]
         })
         .collect();
-    if signal.iter().all(|&value| value == signal[0]) {
-        let requirement = format!("too slow to switch within {} samples", drive.samples);
-        return Err(Error::parameter("clock", clock, requirement));
-    }
+    let switches = signal.iter().any(|&value| value != signal[0]);
+    let requirement = format!("too slow to switch within {} samples", drive.samples);
+    Error::require(switches, "clock", clock, requirement)?;
     Ok(drive.fit(signal))
 }
 
-/// A triangle of `frequency` Hz that starts at the middle of the range, reaches its ends, and whose
-/// amplitude then falls linearly to zero: nested loops, largest first.
+/// A triangle of `frequency` Hz that starts at the middle of the range and whose amplitude falls linearly to zero after
+/// the first peak: it gives nested hysteresis loops, the largest first.
+///
+/// ```
+/// use gpi_core::excitation::{Drive, decaying_triangle};
+/// let drive = Drive { samples: 1000, rate: 1000.0, range: (0.0, 10.0), slew: None };
+/// assert_eq!(decaying_triangle(&drive, 5.0)?[0], 5.0);
+/// # Ok::<(), gpi_core::Error>(())
+/// ```
 ///
 /// # Errors
-/// A parameter out of its range, less than one period.
+/// A parameter is out of its range, or the signal has less than one period.
 pub fn decaying_triangle(drive: &Drive, frequency: f64) -> Result<Vec<f64>, Error> {
     drive.validate()?;
     let periods = drive.samples as f64 * frequency / drive.rate;
-    if !(frequency > 0.0 && frequency < drive.rate / 2.0) || periods < 1.0 {
-        let requirement = format!(
-            "must lie below {} Hz and give at least one period in {} samples",
-            drive.rate / 2.0,
-            drive.samples
-        );
-        return Err(Error::parameter("frequency", frequency, requirement));
-    }
+    let (nyquist, samples) = (drive.rate / 2.0, drive.samples);
+    let requirement =
+        format!("must lie below {nyquist} Hz and give at least one period in {samples} samples");
+    let is_whole = frequency > 0.0 && frequency < nyquist && periods >= 1.0;
+    Error::require(is_whole, "frequency", frequency, requirement)?;
     let (low, high) = drive.range;
     let (middle, amplitude) = (f64::midpoint(low, high), (high - low) / 2.0);
-    let mut signal: Vec<f64> = (0..drive.samples)
+    let signal = (0..drive.samples)
         .map(|k| {
             let phase = k as f64 * frequency / drive.rate;
             let triangle = 1.0 - 4.0 * ((phase + 0.25).fract() - 0.5).abs();
@@ -200,31 +195,31 @@ pub fn decaying_triangle(drive: &Drive, frequency: f64) -> Result<Vec<f64>, Erro
             middle + amplitude * triangle * envelope
         })
         .collect();
-    if let Some(slew) = drive.slew {
-        limit_slope(&mut signal, slew / drive.rate);
-    }
-    Ok(signal)
+    Ok(drive.limited(signal))
 }
 
-/// A quarter of the time each at the low end of the range, the high end, the middle and the low end again.
+/// Four constant levels, each for a quarter of the time: the low end of the range, the high end, the middle, and the low
+/// end again.
 ///
-/// What goes on while the input stands still is slow: creep follows each step, a drift does not, and a
-/// drifting gain shows only away from zero.
+/// Constant input separates slow effects: creep follows each step, a drift does not, and a gain drift is visible only
+/// away from zero.
+///
+/// ```
+/// use gpi_core::excitation::{Drive, held_steps};
+/// let drive = Drive { samples: 4, rate: 1.0, range: (0.0, 10.0), slew: None };
+/// assert_eq!(held_steps(&drive)?, [0.0, 10.0, 5.0, 0.0]);
+/// # Ok::<(), gpi_core::Error>(())
+/// ```
 ///
 /// # Errors
-/// A parameter out of its range, fewer than four samples.
+/// A parameter is out of its range, or there are fewer than four samples.
 pub fn held_steps(drive: &Drive) -> Result<Vec<f64>, Error> {
     drive.validate()?;
-    if drive.samples < 4 {
-        return Err(Error::parameter("samples", drive.samples, "at least one for each level, 4"));
-    }
+    let requirement = "at least 4 are needed, one for each level";
+    Error::require(drive.samples >= 4, "samples", drive.samples, requirement)?;
     let (low, high) = drive.range;
     let levels = [low, high, f64::midpoint(low, high), low];
-    let mut signal: Vec<f64> = (0..drive.samples).map(|k| levels[4 * k / drive.samples]).collect();
-    if let Some(slew) = drive.slew {
-        limit_slope(&mut signal, slew / drive.rate);
-    }
-    Ok(signal)
+    Ok(drive.limited((0..drive.samples).map(|k| levels[4 * k / drive.samples]).collect()))
 }
 
 /// Reproducible random numbers (SplitMix64), the same on every platform.

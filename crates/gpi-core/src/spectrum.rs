@@ -1,11 +1,20 @@
-//! Lines of a signal's spectrum.
+//! Lines of a signal's discrete spectrum. Line i is the frequency `i rate / samples`.
 
 use crate::Record;
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 use std::ops::Range;
 
-/// The transform of a signal without its mean under Hann's window.
+/// Lines at which a line belongs to the same peak: a line whose amplitude changes slowly spreads over several lines.
+const NEAR: usize = 5;
+
+/// Up to this line a peak cannot be distinguished from a trend, whose power is in the lowest lines.
+const SLOWEST: usize = 10;
+
+/// A signal is one sine if this fraction of its power is near one line; a triangle has 0.986 in its fundamental.
+const ALL: f64 = 0.995;
+
+/// The discrete Fourier transform of a signal without its mean, under the Hann window.
 pub(crate) fn tapered(values: &[f64]) -> Vec<Complex64> {
     let n = values.len();
     let mean = values.iter().sum::<f64>() / n as f64;
@@ -16,12 +25,13 @@ pub(crate) fn tapered(values: &[f64]) -> Vec<Complex64> {
     spectrum
 }
 
-/// Power of the lines below half the rate.
+/// Power of the lines below half the sampling rate.
 pub(crate) fn power(values: &[f64]) -> Vec<f64> {
     tapered(values)[..values.len() / 2].iter().map(Complex64::norm_sqr).collect()
 }
 
-/// Where between the lines the peak at `line` is: the ratio of two neighbours in Hann's main lobe tells it.
+/// The frequency, in lines, of the peak at `line`, from two neighbours in the main lobe of the Hann window: for a peak d
+/// lines above a line, the amplitude of the next line over that of the line is `(1 + d) / (2 - d)`.
 pub(crate) fn peak(power: &[f64], line: usize) -> f64 {
     let size = |place: usize| power.get(place).map_or(0.0, |value| value.sqrt());
     let (below, here, above) = (line.checked_sub(1).map_or(0.0, size), size(line), size(line + 1));
@@ -33,25 +43,23 @@ pub(crate) fn peak(power: &[f64], line: usize) -> f64 {
     line as f64 + shift.clamp(-1.0, 1.0)
 }
 
-/// The lines that a slowly changing amplitude spreads one line over.
+/// The lines that belong to the peak at `place`.
 pub(crate) fn near(place: f64, count: usize) -> Range<usize> {
-    const NEAR: usize = 5;
     let line = place.round() as usize;
     line.saturating_sub(NEAR).min(count)..(line + NEAR + 1).min(count)
 }
 
 /// The strongest line of a spectrum.
 pub(crate) struct Strongest {
-    /// Where it is, in lines.
+    /// Its frequency, in lines.
     pub place: f64,
-    /// The part of the power that is near it.
+    /// The fraction of the power near it.
     pub part: f64,
 }
 
 impl Strongest {
-    /// None where the strongest is too slow to be told from a trend.
+    /// `None` if the strongest line cannot be distinguished from a trend.
     pub(crate) fn of(power: &[f64]) -> Option<Self> {
-        const SLOWEST: usize = 10;
         let line = (0..power.len()).max_by(|&i, &j| power[i].total_cmp(&power[j]))?;
         let around: f64 = power[near(line as f64, power.len())].iter().sum();
         let part = around / power.iter().sum::<f64>().max(f64::MIN_POSITIVE);
@@ -59,10 +67,8 @@ impl Strongest {
     }
 }
 
-/// Whether all that drives the actuator is one sine: a cycle that repeats.
+/// Whether every input of the record is a single sine.
 pub(crate) fn is_one_sine(record: &Record) -> bool {
-    /// Part of the power; a triangle has 0.986 of it in its fundamental.
-    const ALL: f64 = 0.995;
     let is_sine = |drive: &[f64]| Strongest::of(&power(drive)).is_some_and(|line| line.part > ALL);
     let mut columns = record.experiments().iter().flat_map(|e| e.input.column_iter());
     columns.all(|column| is_sine(column.as_slice()))
@@ -75,11 +81,9 @@ mod tests {
 
     fn driven_by(input: impl Fn(f64) -> f64) -> Record {
         let u = Matrix::from_fn(4000, 1, |k, _| input(k as f64 / 200.0));
-        let covariates = Matrix::zeros(4000, 0);
-        let run =
-            Experiment { output: u.clone(), input: u, covariates, warmup: 0, held_out: vec![] };
         let channel = |name: &str| vec![Channel::new(name, "V")];
-        Record::new(vec![run], 200.0, channel("u"), channel("y"), vec![]).unwrap()
+        let runs = vec![Experiment::new(u.clone(), u)];
+        Record::new(runs, 200.0, channel("u"), channel("y"), vec![]).unwrap()
     }
 
     #[test]

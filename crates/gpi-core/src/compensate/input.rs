@@ -1,4 +1,4 @@
-//! The input stage: what arrives late is sent earlier, what is too fast is slowed down.
+//! Inversion of the input effects: delays shift the drive, and limits of its slope clamp it.
 
 use crate::effects::InputStage;
 use crate::{Matrix, Model};
@@ -8,12 +8,12 @@ fn effects(model: &Model) -> impl Iterator<Item = &dyn InputStage> {
     model.effects().iter().filter_map(|effect| effect.place().input_stage())
 }
 
-/// Samples by which delays let the drive begin earlier.
+/// Number of samples by which delays make the drive begin earlier.
 pub(super) fn lead(model: &Model) -> usize {
     effects(model).map(|effect| effect.late().ceil() as usize).sum()
 }
 
-/// Sends each drive earlier by its delay; between samples it is a straight line.
+/// Shifts each drive by its delay to earlier times, with linear interpolation between samples.
 pub(super) fn advance(model: &Model, drive: &mut Matrix) {
     let last = drive.nrows() - 1;
     for effect in effects(model) {
@@ -30,7 +30,8 @@ pub(super) fn advance(model: &Model, drive: &mut Matrix) {
     }
 }
 
-/// Keeps each drive as slow as `slew` and its own effects ask for, and counts where it was not.
+/// Limits the slope of each drive to `slew` (per second) and to the limits of its effects; returns the number of clamped
+/// samples.
 pub(super) fn slow_down(model: &Model, drive: &mut Matrix, slew: f64) -> usize {
     let mut too_fast = 0;
     for (input, mut column) in drive.column_iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! What to drive an actuator with so that its output follows a reference: the model, run backwards.
+//! Compensation: the drive for which the model's output follows a reference.
 
 mod dynamics;
 mod input;
@@ -8,23 +8,31 @@ mod solve;
 mod streaming;
 
 use crate::effects::{Effect, InputStage};
+use crate::linear::NoncausalFir;
+use crate::record::require_finite;
 use crate::{Error, Experiment, Matrix, Model, Record, SimulationError};
-use dynamics::Backward;
-use std::cmp::Ordering;
 pub use streaming::StreamingCompensator;
 
-/// What a drive may do, and how it is found.
+/// An error below this fraction of the largest reference is rounding.
+const EXACT: f64 = 1e-13;
+
+/// Another pass is made only if the last one reduced the error to less than this fraction: passes that gain less than
+/// 10 % approach a limit, such as that of the drive.
+const WORTH: f64 = 0.9;
+
+/// Limits of the drive, and options of the method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompensateOptions {
-    /// Lowest and highest drive of each input, in its unit; one pair stands for all, none for no limit.
+    /// Lower and upper limit of the drive of each input, in its unit. A single pair holds for all inputs, an empty list
+    /// means no limits.
     pub limits: Vec<(f64, f64)>,
-    /// The fastest drive, in units of the input per second.
+    /// Largest slope of the drive, in units of the input per second.
     pub slew: f64,
-    /// Whether the dynamics G are left alone: only their DC gain is inverted, and nothing looks ahead.
+    /// Whether only the DC gain of G is inverted, which needs no preview.
     pub quasi_static: bool,
-    /// Samples by which the drive may begin before the reference; as many as G needs when `None`.
+    /// Number of samples by which the drive may begin before the reference; as many as G needs if `None`.
     pub preview: Option<usize>,
-    /// Most passes in which what a simulation still misses is added to what is asked for.
+    /// Largest number of passes after the first. Each adds the remaining simulation error to the signal that is inverted.
     pub passes: usize,
 }
 
@@ -34,43 +42,45 @@ impl Default for CompensateOptions {
     }
 }
 
-/// A drive, and what the model says that it does.
+/// A drive, and the output that the model predicts for it.
 #[derive(Clone, Debug)]
 pub struct Compensation {
     /// u, (lead + samples, inputs).
     pub drive: Matrix,
-    /// The reference with the lead, in which it stands at its first value, (lead + samples, outputs).
+    /// The reference, (lead + samples, outputs); constant at its first value during the lead.
     pub reference: Matrix,
-    /// The outputs of the model for `drive`, without the effects that no input drives.
+    /// The outputs of the model for `drive`, without the effects that the input does not drive, (lead + samples, outputs).
     pub predicted: Matrix,
-    /// The same for a drive in proportion to the reference: the straight line through `drive`.
+    /// The same for a drive proportional to the reference: the least squares line through `drive`.
     pub in_proportion: Matrix,
-    /// Samples by which the drive begins before the reference.
+    /// Number of samples by which the drive begins before the reference.
     pub lead: usize,
-    /// `reference` less `predicted` over the reference's own samples.
+    /// The error `reference - predicted` behind the lead.
     pub error: SimulationError,
-    /// `reference` less `in_proportion`.
+    /// The error `reference - in_proportion` behind the lead.
     pub error_in_proportion: SimulationError,
-    /// Root mean square error after each pass.
+    /// Root mean square error after each pass, over all outputs.
     pub passes: Vec<f64>,
-    /// Samples at which a drive stands at a limit of `limits`, or of where the envelope rises.
+    /// Number of samples at which a drive is at one of its `limits`, or at the end of the interval in which the envelope
+    /// increases.
     pub out_of_reach: usize,
-    /// Samples at which a drive would have had to be faster than `slew`.
+    /// Number of samples at which the slope of a drive was limited to `slew`.
     pub too_fast: usize,
-    /// Effects that are compensated.
+    /// The effects that the drive compensates.
     pub compensated: Vec<&'static str>,
-    /// Effects that no drive compensates, and why.
+    /// The effects that it does not compensate, each with the reason.
     pub left: Vec<(&'static str, &'static str)>,
 }
 
 impl Model {
-    /// The drive that makes the outputs follow a reference (samples, outputs).
+    /// The drive for which the outputs follow a `reference` (samples, outputs).
     ///
-    /// Backwards through the chain: the output stage sample by sample, G by its noncausal inverse (46), the hysteresis
-    /// by its exact inverse ([`crate::operators::Gpi::inverse`]), a delay by driving earlier. Creep and loops around G
-    /// have no such inverse; the model is simulated, what it misses is added to what is asked for, and the chain is
-    /// gone through once more, as long as that helps. The actuator is taken to stand at the reference's first value, as
-    /// by [`Model::start`], and the reference to stay at its last one.
+    /// The parts of the model are inverted from the output to the input: the output effects sample by sample, G by its
+    /// noncausal inverse (46), the hysteresis by its exact inverse ([`crate::operators::Gpi::inverse`]), and a delay by an
+    /// earlier drive. Creep and loops around G have no such inverse. Therefore the model is simulated, the remaining error
+    /// is added to the signal that is inverted, and the inversion is repeated as long as the error falls. Initially the
+    /// actuator is in the steady state of [`Model::start`] at the reference's first value; after its last sample, the
+    /// reference is taken as constant.
     ///
     /// ```
     /// use gpi_core::compensate::CompensateOptions;
@@ -90,31 +100,22 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// Another number of channels, unequal numbers of inputs and outputs, samples that are not finite, limits that leave
-    /// nothing, a hysteresis or dynamics without an inverse.
+    /// The reference has another number of channels than the model or is not finite, the numbers of inputs and outputs
+    /// differ, the limits leave no interval, or the hysteresis or the dynamics have no inverse.
     pub fn compensate(
         &self,
         reference: &Matrix,
         options: &CompensateOptions,
     ) -> Result<Compensation, Error> {
-        /// Of the reference's span: what is left below is rounding.
-        const EXACT: f64 = 1e-13;
-        /// By how much a pass has to lower the error for another one to be tried.
-        const WORTH: f64 = 0.9;
         let (compensated, left) = self.shares();
         let driven = self.driven();
         driven.require_reference(reference)?;
         let limits = driven.limits(&options.limits)?;
-        if options.slew.is_nan() || options.slew <= 0.0 {
-            return Err(Error::parameter(
-                "slew",
-                options.slew,
-                "the fastest drive must be positive",
-            ));
-        }
+        let requirement = "the largest slope of the drive must be positive";
+        Error::require(options.slew > 0.0, "slew", options.slew, requirement)?;
         let known = if options.quasi_static { driven.quasi_static()? } else { driven.clone() };
-        let backward = Backward::new(&known, options)?;
-        let lead = backward.lead() + input::lead(&known);
+        let inverse = dynamics::inverse(&known, options)?;
+        let lead = inverse.noncausal + input::lead(&known);
         let rows = lead + reference.nrows();
         let reference =
             Matrix::from_fn(rows, reference.ncols(), |k, o| reference[(k.saturating_sub(lead), o)]);
@@ -122,7 +123,7 @@ impl Model {
         let mut best: Option<(Found, f64)> = None;
         let mut passes = Vec::new();
         for _ in 0..=options.passes {
-            let found = known.drive_for(&asked, &backward, &limits, options.slew)?;
+            let found = known.drive_for(&asked, &inverse, &limits, options.slew)?;
             let missed = &reference - known.simulate(&found.drive)?;
             let scored = missed.rows(lead, rows - lead);
             let rms = (scored.norm_squared() / scored.len() as f64).sqrt();
@@ -139,7 +140,7 @@ impl Model {
         }
         let Some((found, _)) = best else {
             let requirement =
-                "the chain run backwards grows without bounds; leave G alone with `quasi_static`";
+                "the inverse of the model is unbounded; invert the DC gain only (`quasi_static`)";
             return Err(Error::parameter("reference", f64::NAN, requirement));
         };
         let predicted = driven.simulate(&found.drive)?;
@@ -160,16 +161,19 @@ impl Model {
         })
     }
 
-    /// Names of the effects that a drive compensates, and of the others with the reason.
+    /// The names of the effects that a drive compensates, and those of the others with the reason.
     fn shares(&self) -> (Vec<&'static str>, Vec<(&'static str, &'static str)>) {
         let (mut compensated, mut left) = (Vec::new(), Vec::new());
         for effect in self.effects() {
             if !effect.entry().driven {
                 left.push((effect.name(), "the input does not drive it"));
             } else if is_added(effect) {
-                left.push((effect.name(), "the column that drives it is not known beforehand"));
+                left.push((effect.name(), "the column that drives it is not known in advance"));
             } else if effect.place().input_stage().is_some_and(is_limited) {
-                left.push((effect.name(), "the drive is kept below its limit instead"));
+                left.push((
+                    effect.name(),
+                    "the slope of the drive is kept below its limit instead",
+                ));
             } else {
                 compensated.push(effect.name());
             }
@@ -177,7 +181,7 @@ impl Model {
         (compensated, left)
     }
 
-    /// The model without what no input drives.
+    /// The model without the effects that the input does not drive.
     fn driven(&self) -> Self {
         let mut driven = self.clone();
         driven.effects.retain(|effect| effect.entry().driven && !is_added(effect));
@@ -189,20 +193,11 @@ impl Model {
         let columns = ("reference", reference.ncols());
         Error::require_equal("outputs", columns, ("model", outputs))?;
         Error::require_equal("channels", ("the model's inputs", inputs), ("its outputs", outputs))?;
-        if reference.nrows() == 0 {
-            let purpose = "a reference".to_owned();
-            return Err(Error::TooFewSamples { samples: 0, needed: 1, purpose });
-        }
-        for (column, channel) in reference.column_iter().zip(self.outputs()) {
-            let count = column.iter().filter(|value| !value.is_finite()).count();
-            if let Some(row) = column.iter().position(|value| !value.is_finite()) {
-                return Err(Error::NotFinite { column: channel.name.clone(), row, count });
-            }
-        }
-        Ok(())
+        Error::require_samples(reference.nrows(), 1, "a reference")?;
+        require_finite(reference, self.outputs())
     }
 
-    /// The limits of each input.
+    /// The limits of each input's drive.
     fn limits(&self, given: &[(f64, f64)]) -> Result<Vec<[f64; 2]>, Error> {
         let inputs = self.inputs().len();
         let limits: Vec<[f64; 2]> = match given {
@@ -211,48 +206,39 @@ impl Model {
             _ => given.iter().map(|&(lower, upper)| [lower, upper]).collect(),
         };
         Error::require_equal("inputs", ("limits", limits.len()), ("model", inputs))?;
-        match limits.iter().find(|[lower, upper]| lower.partial_cmp(upper) != Some(Ordering::Less))
-        {
-            Some([lower, upper]) => {
-                let value = format!("{lower}, {upper}");
-                Err(Error::parameter("limits", value, "the lower one must be below the upper one"))
-            }
-            None => Ok(limits),
+        for [lower, upper] in &limits {
+            let requirement = "the lower limit must be below the upper limit";
+            Error::require(lower < upper, "limits", format!("{lower}, {upper}"), requirement)?;
         }
+        Ok(limits)
     }
 
-    /// The drive for what is asked of the outputs.
+    /// The drive for given outputs, without corrections.
     fn drive_for(
         &self,
         asked: &Matrix,
-        backward: &Backward,
+        inverse: &NoncausalFir,
         limits: &[[f64; 2]],
         slew: f64,
     ) -> Result<Found, Error> {
-        let displacement = output::before_sensor(self, asked);
-        let v = backward.run(&displacement)?;
+        let v = dynamics::invert(inverse, &output::before_sensor(self, asked))?;
         let (mut drive, out_of_reach) = plays::undone(self, &v, limits)?;
         input::advance(self, &mut drive);
         let too_fast = input::slow_down(self, &mut drive, slew);
         Ok(Found { drive, out_of_reach, too_fast })
     }
 
-    /// How far a prediction is from the reference behind the lead.
+    /// The error of a prediction behind the lead.
     fn missed(
         &self,
         reference: &Matrix,
         predicted: &Matrix,
         lead: usize,
     ) -> Result<SimulationError, Error> {
-        let experiment = Experiment {
-            input: Matrix::zeros(reference.nrows(), self.inputs().len()),
-            output: reference.clone(),
-            covariates: Matrix::zeros(reference.nrows(), 0),
-            warmup: lead,
-            held_out: vec![],
-        };
-        let channels = (self.inputs().to_vec(), self.outputs().to_vec());
-        let record = Record::new(vec![experiment], self.rate(), channels.0, channels.1, vec![])?;
+        let input = Matrix::zeros(reference.nrows(), self.inputs().len());
+        let runs = vec![Experiment { warmup: lead, ..Experiment::new(input, reference.clone()) }];
+        let (inputs, outputs) = (self.inputs().to_vec(), self.outputs().to_vec());
+        let record = Record::new(runs, self.rate(), inputs, outputs, vec![])?;
         Ok(SimulationError::of(&record, &[reference - predicted], false))
     }
 }
@@ -262,33 +248,30 @@ fn is_limited(effect: &dyn InputStage) -> bool {
     effect.fastest().is_finite()
 }
 
-/// Whether it comes on top of what the input does.
+/// Whether the effect is added to the response to the input.
 fn is_added(effect: &Effect) -> bool {
     effect.place().added().is_some()
 }
 
+/// A drive, and the numbers of samples at which a limit or the slew rate clamped it.
 struct Found {
     drive: Matrix,
     out_of_reach: usize,
     too_fast: usize,
 }
 
-/// A drive in proportion to what G at rest asks for: the straight line through another drive, by least squares.
+/// The drive proportional to the v that G needs in steady state: the least squares line through another drive.
 fn proportional(model: &Model, reference: &Matrix, drive: &Matrix) -> Result<Matrix, Error> {
     let still = Matrix::from_fn(reference.nrows(), reference.ncols(), |k, o| {
         reference[(k, o)] - model.offsets()[o]
     });
-    let v = still * dynamics::inverse_gain(model.linear())?.transpose();
-    let mut line = v.clone();
-    for ((mut line, v), u) in line.column_iter_mut().zip(v.column_iter()).zip(drive.column_iter()) {
+    let mut line = still * dynamics::inverse_gain(model.linear())?.transpose();
+    for (mut v, u) in line.column_iter_mut().zip(drive.column_iter()) {
         let (v_mean, u_mean) = (v.mean(), u.mean());
-        let (mut squares, mut products) = (0.0, 0.0);
-        for (v, u) in v.iter().zip(u.iter()) {
-            squares += (v - v_mean) * (v - v_mean);
-            products += (v - v_mean) * (u - u_mean);
-        }
-        let slope = if squares > 0.0 { products / squares } else { 0.0 };
-        line.iter_mut().for_each(|value| *value = u_mean + slope * (*value - v_mean));
+        v.add_scalar_mut(-v_mean);
+        let squares = v.norm_squared();
+        let slope = if squares > 0.0 { v.dot(&u.add_scalar(-u_mean)) / squares } else { 0.0 };
+        v.apply(|value| *value = u_mean + slope * *value);
     }
     Ok(line)
 }

@@ -1,8 +1,12 @@
-//! The output stage: what the sensor has to see for what it is to show.
+//! Inversion of the output effects: the displacement for which the sensor shows a given signal.
 
 use super::solve::zero_of;
 use crate::effects::{Moment, OutputStage};
 use crate::{Matrix, Model};
+
+/// First step of the search for a sample's displacement, as a fraction of the largest signal: about the change between
+/// samples of a slow reference.
+const STEP: f64 = 1e-4;
 
 /// The displacements (samples, outputs) for which the sensors show a signal (samples, outputs).
 pub(super) fn before_sensor(model: &Model, shown: &Matrix) -> Matrix {
@@ -17,7 +21,7 @@ pub(super) fn before_sensor(model: &Model, shown: &Matrix) -> Matrix {
     displacement
 }
 
-/// Sample by sample, each from the one before on.
+/// Inverts one effect sample by sample; the search for each sample starts at the previous one.
 fn undo(effect: &dyn OutputStage, signal: &mut [f64], rate: f64) {
     const ALL: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
     let size = signal.iter().fold(f64::MIN_POSITIVE, |size, value| size.max(value.abs()));
@@ -29,7 +33,7 @@ fn undo(effect: &dyn OutputStage, signal: &mut [f64], rate: f64) {
             let mut own = memory.clone().unwrap_or_else(|| effect.rest(x));
             (effect.sense(&mut own, x, moment(k)).0, own)
         };
-        before = zero_of(|x| show(x).0 - wanted, before, 1e-4 * size, ALL);
+        before = zero_of(|x| show(x).0 - wanted, before, STEP * size, ALL);
         memory = Some(show(before).1);
         *value = before;
     }

@@ -1,11 +1,21 @@
-//! The hysteresis undone: by its exact inverse, or sample by sample where effects act on its plays.
+//! Inversion of the hysteresis: exactly, or sample by sample if effects act on its plays.
 
 use super::solve::zero_of;
 use crate::effects::{Effect, Stage};
 use crate::operators::{GpiState, Operator};
 use crate::{Error, Matrix, Model, ModelState};
 
-/// The drive (samples, inputs) for v (samples, inputs), from rest, and how many samples stand at a limit.
+/// A sample is out of reach if v misses the wanted value by more than this fraction of the largest v: far above the
+/// error of the search, which ends at the precision of `f64`.
+const NEAR: f64 = 1e-9;
+
+/// First step of the search for the first sample, as a fraction of the largest v; later ones start with the last change.
+const FIRST_STEP: f64 = 1e-3;
+
+/// Least first step of the search, as a fraction of the largest v, for samples at which u does not change.
+const LEAST_STEP: f64 = 1e-6;
+
+/// The drive (samples, inputs) for v (samples, inputs) from the initial state, and the number of samples at a limit.
 pub(super) fn undone(
     model: &Model,
     v: &Matrix,
@@ -39,8 +49,8 @@ struct Plays<'a> {
 }
 
 impl<'a> Plays<'a> {
-    /// Where they stand when all inputs are zero and this one has been raised to `u`.
-    fn standing(model: &'a Model, input: usize, u: f64) -> Result<Self, Error> {
+    /// The steady state in which this input is `u` and all others are zero.
+    fn at_steady_state(model: &'a Model, input: usize, u: f64) -> Result<Self, Error> {
         let mut inputs = vec![0.0; model.inputs().len()];
         inputs[input] = u;
         let ModelState { mut hysteresis, effects: memories, .. } = model.start(&inputs)?;
@@ -55,24 +65,22 @@ impl<'a> Plays<'a> {
     }
 }
 
-/// Turns v of an input into u in place, and counts what no u between the limits gives.
+/// Replaces v of an input by u, and counts the samples for which no u between the limits exists.
 fn follow(
     model: &Model,
     input: usize,
     signal: &mut [f64],
     limits: [f64; 2],
 ) -> Result<usize, Error> {
-    /// Of the largest v.
-    const NEAR: f64 = 1e-9;
     let size = signal.iter().fold(f64::MIN_POSITIVE, |size, v| size.max(v.abs()));
     let mut plays: Option<Plays> = None;
-    let (mut out_of_reach, mut before, mut stride) = (0, 0.0, 1e-3 * size);
+    let (mut out_of_reach, mut before, mut stride) = (0, 0.0, FIRST_STEP * size);
     for value in signal {
         let wanted = *value;
         let reached = |u: f64| {
             let mut own = match &plays {
                 Some(plays) => plays.clone(),
-                None => Plays::standing(model, input, u)?,
+                None => Plays::at_steady_state(model, input, u)?,
             };
             Ok::<_, Error>((own.step(u)?, own))
         };
@@ -81,7 +89,7 @@ fn follow(
         let (v, own) = reached(u)?;
         plays = Some(own);
         out_of_reach += usize::from((v - wanted).abs() > NEAR * size);
-        stride = (u - before).abs().max(1e-6 * size);
+        stride = (u - before).abs().max(LEAST_STEP * size);
         before = u;
         *value = u;
     }

@@ -1,17 +1,22 @@
-//! One equation in one unknown, where no formula turns it around.
+//! The zero of an increasing function of one unknown.
 
-/// Where `missing`, which rises, is zero between two limits; the nearer limit where it is not zero between them.
+/// Doublings of the step after which the search for a bracket ends: a factor of 10^24.
+const DOUBLINGS: usize = 80;
+
+/// Iterations within a bracket after which the search ends; a third are bisections, so the bracket is 10^10 times
+/// narrower then even for the worst function.
+const HALVINGS: usize = 100;
+
+/// The zero of the increasing function `missing` between two limits; the nearer limit if there is no zero between them.
 ///
-/// From a guess on in steps that double until the zero lies between two points, then regula falsi (Illinois) and
-/// bisection.
+/// Starting at `guess`, the steps double until they bracket the zero. The bracket is then narrowed by regula falsi (the
+/// Illinois variant) and bisection.
 pub(super) fn zero_of(
     mut missing: impl FnMut(f64) -> f64,
     guess: f64,
     step: f64,
     [lower, upper]: [f64; 2],
 ) -> f64 {
-    const DOUBLINGS: usize = 80;
-    const HALVINGS: usize = 100;
     let (mut a, mut fa) = (guess.clamp(lower, upper), 0.0);
     let (mut b, mut fb) = (a, missing(a));
     let mut stride = if fb < 0.0 { step } else { -step };
@@ -32,7 +37,7 @@ pub(super) fn zero_of(
         if middle == a || middle == b {
             break;
         }
-        // every third time by half, whatever the curve
+        // every third iteration is a bisection, whatever the function
         if turn % 3 < 2 {
             let straight = b - fb * (b - a) / (fb - fa);
             if (straight - a) * (straight - b) < 0.0 {

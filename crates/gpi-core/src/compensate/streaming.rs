@@ -1,25 +1,26 @@
-//! The compensator that runs beside an actuator, one sample at a time.
+//! The compensator for real-time use, which computes one sample of the drive at a time.
 
 use crate::effects::{Effect, Place, Stage};
 use crate::operators::{Compensator, Lags};
 use crate::{Error, Model};
 
-/// What a model says of a reference that is not known beforehand.
+/// A compensator for a reference that is not known in advance.
 #[derive(Clone, Debug)]
 pub struct StreamingCompensator {
-    /// From a sample of the reference to the drive.
+    /// Computes the drive for one sample of the reference.
     pub compensator: Compensator<Vec<f64>, Vec<f64>, Vec<f64>>,
-    /// Parts of the model that it undoes.
+    /// The parts of the model that it compensates.
     pub compensated: Vec<&'static str>,
-    /// Parts that it does not, and why.
+    /// The parts that it does not compensate, each with the reason.
     pub left: Vec<(&'static str, &'static str)>,
 }
 
 impl Model {
-    /// The compensator of one sample at a time: hysteresis and creep undone exactly, of the dynamics their DC gain.
+    /// The compensator for real-time use: it inverts hysteresis and creep exactly, and the DC gain of the dynamics.
     ///
-    /// It looks at nothing that is yet to come, so that the output follows the reference as late as G lets it. For
-    /// firmware, see [`Compensator`]; [`Model::compensate`] undoes the dynamics too.
+    /// `(lower, upper)` are the limits of the drive, in its unit. The compensator needs no preview, so the output follows
+    /// the reference with the lag of G. For firmware, see [`Compensator`]; [`Model::compensate`] inverts the dynamics
+    /// too.
     ///
     /// ```
     /// use gpi_core::linear::StateSpace;
@@ -40,8 +41,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// Several inputs or outputs, limits between which the envelope does not rise, a hysteresis or a DC gain without an
-    /// inverse.
+    /// The model has several inputs or outputs, the envelope does not increase between the limits, or the hysteresis or
+    /// the DC gain has no inverse.
     pub fn compensator(&self, (lower, upper): (f64, f64)) -> Result<StreamingCompensator, Error> {
         for (name, channels) in [("inputs", self.inputs()), ("outputs", self.outputs())] {
             Error::require_equal(name, ("model", channels.len()), ("a compensator", 1))?;
@@ -50,7 +51,7 @@ impl Model {
         let (mut rates, mut gains) = (Vec::new(), Vec::new());
         let (mut compensated, mut left) = (vec!["hysteresis"], Vec::new());
         if self.linear().order() > 0 {
-            left.push(("dynamics", "of G only the DC gain is undone"));
+            left.push(("dynamics", "only the DC gain of G is inverted"));
         }
         for effect in self.effects() {
             let sections = match effect.place() {
@@ -79,11 +80,11 @@ impl Model {
     }
 }
 
-/// Why a compensator that knows the past only leaves an effect alone.
+/// The reason why a compensator without preview does not compensate an effect.
 fn reason(effect: &Effect) -> &'static str {
     match effect.stage() {
         _ if !effect.entry().driven => "the input does not drive it",
-        Stage::Dynamics => "of its dynamics only the DC gain is undone",
-        _ => "it is undone where the reference is known beforehand",
+        Stage::Dynamics => "only the DC gain of its dynamics is inverted",
+        _ => "it is compensated only if the reference is known in advance",
     }
 }

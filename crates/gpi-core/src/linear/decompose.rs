@@ -1,12 +1,22 @@
-//! Matrix decompositions by faer, on the matrices that the rest of the crate holds.
+//! Matrix decompositions of nalgebra matrices by faer.
 
 use crate::{Error, Matrix};
-use faer::linalg::solvers::Solve;
+use faer::linalg::solvers::{self, Solve};
 use faer::{Mat, MatRef, Scale, Side};
 use nalgebra::DVector;
 use num_complex::Complex64;
 
-/// Singular value decomposition `u diag(s) v^T`, singular values in descending order.
+/// Directions of [`leading_svd`] besides the wanted ones: they let the wanted directions converge faster.
+const SPARE: usize = 6;
+
+/// Passes after which [`leading_svd`] gives up, so that the full decomposition is used.
+const PASSES: i32 = 6;
+
+/// Residual of a singular pair, relative to the largest singular value, at which [`leading_svd`] has converged: the
+/// rounding error of the full decomposition.
+const CONVERGED: f64 = 1e-14;
+
+/// Singular value decomposition `u diag(s) v^T` with the singular values in descending order.
 pub(crate) struct Svd {
     pub u: Matrix,
     pub s: Vec<f64>,
@@ -25,9 +35,9 @@ fn not_converged(decomposition: &'static str, matrix: &Matrix) -> Error {
     Error::NotConverged { decomposition, rows: matrix.nrows(), columns: matrix.ncols() }
 }
 
-/// The thin singular value decomposition.
+/// The thin singular value decomposition: `u` is (rows, n) and `v` (columns, n), where n is the smaller dimension.
 ///
-/// That of a symmetric matrix is its eigendecomposition up to signs, which takes less.
+/// For a symmetric matrix it follows from the eigendecomposition, which is faster.
 pub(crate) fn svd(matrix: &Matrix) -> Result<Svd, Error> {
     if is_symmetric(matrix) {
         let (values, vectors) = symmetric_eigen(matrix)?;
@@ -41,9 +51,11 @@ pub(crate) fn svd(matrix: &Matrix) -> Result<Svd, Error> {
         }
         return Ok(Svd { u, s, v });
     }
-    let svd = view(matrix)
-        .thin_svd()
-        .map_err(|_| not_converged("singular value decomposition", matrix))?;
+    parts(view(matrix).thin_svd(), matrix)
+}
+
+fn parts<E>(found: Result<solvers::Svd<f64>, E>, matrix: &Matrix) -> Result<Svd, Error> {
+    let svd = found.map_err(|_| not_converged("singular value decomposition", matrix))?;
     let s = svd.S().column_vector().iter().copied().collect();
     Ok(Svd { u: owned(svd.U()), s, v: owned(svd.V()) })
 }
@@ -55,16 +67,11 @@ pub(crate) fn singular_values(matrix: &Matrix) -> Result<Vec<f64>, Error> {
         .map_err(|_| not_converged("singular value decomposition", matrix))
 }
 
-/// The `count` largest singular values with their vectors by passes of a block of directions through the matrix
-/// (Halko, Martinsson and Tropp 2011); `None` where some passes do not bring them to rounding.
+/// The `count` largest singular values with their vectors by subspace iteration (Halko, Martinsson and Tropp 2011);
+/// `None` if they do not converge within a few passes.
 pub(crate) fn leading_svd(matrix: &Matrix, count: usize) -> Option<Svd> {
-    /// Directions besides those that are wanted: what they take up disturbs these no more.
-    const SPARE: usize = 6;
-    const PASSES: i32 = 6;
-    /// Of the largest singular value.
-    const TOLERANCE: f64 = 1e-14;
     let (a, width) = (view(matrix), (count + SPARE).min(matrix.nrows().min(matrix.ncols())));
-    // any directions that no singular vector is at right angles to
+    // arbitrary directions: none of the singular vectors may be orthogonal to all of them
     let mut image = a * Mat::from_fn(matrix.ncols(), width, |i, j| {
         ((i * i + 1) as f64 * (j + 1) as f64 * 0.618).sin()
     });
@@ -75,18 +82,18 @@ pub(crate) fn leading_svd(matrix: &Matrix, count: usize) -> Option<Svd> {
         let (s, right) = (parts.S().column_vector(), parts.U());
         let left = left * parts.V();
         image = a * right;
-        // the transposed matrix turns each left vector into s times the right one by construction
+        // `A^T u = s v` holds by construction, so the residual is that of `A v = s u`
         let error = |j: usize| (image.col(j) - left.col(j) * Scale(s[j])).norm_l2() / s[0];
         let error = (0..count).map(error).fold(0.0, f64::max);
-        if error <= TOLERANCE {
+        if error <= CONVERGED {
             return Some(Svd {
                 u: owned(left.as_ref().subcols(0, count)),
                 s: s.iter().copied().take(count).collect(),
                 v: owned(right.subcols(0, count)),
             });
         }
-        // each pass lowers it as much as the one before did
-        if error * (error / before).powi(passes) > TOLERANCE && before.is_finite() {
+        // prediction: each pass reduces the error by the same factor
+        if error * (error / before).powi(passes) > CONVERGED && before.is_finite() {
             break;
         }
         before = error;
@@ -94,17 +101,14 @@ pub(crate) fn leading_svd(matrix: &Matrix, count: usize) -> Option<Svd> {
     None
 }
 
-/// The full singular value decomposition: u and v are square.
+/// The full singular value decomposition: `u` and `v` are square.
 pub(crate) fn full_svd(matrix: &Matrix) -> Result<Svd, Error> {
     let (rows, columns) = matrix.shape();
     if matrix.is_empty() {
         let (u, v) = (Matrix::identity(rows, rows), Matrix::identity(columns, columns));
         return Ok(Svd { u, s: Vec::new(), v });
     }
-    let svd =
-        view(matrix).svd().map_err(|_| not_converged("singular value decomposition", matrix))?;
-    let s = svd.S().column_vector().iter().copied().collect();
-    Ok(Svd { u: owned(svd.U()), s, v: owned(svd.V()) })
+    parts(view(matrix).svd(), matrix)
 }
 
 fn is_symmetric(matrix: &Matrix) -> bool {
@@ -112,7 +116,7 @@ fn is_symmetric(matrix: &Matrix) -> bool {
     matrix.is_square() && (0..n).all(|j| (0..j).all(|i| matrix[(i, j)] == matrix[(j, i)]))
 }
 
-/// Eigenvalues (descending) and eigenvectors of a symmetric matrix; its lower triangle is read.
+/// Eigenvalues (descending) and eigenvectors (columns) of a symmetric matrix; only its lower triangle is used.
 pub(crate) fn symmetric_eigen(matrix: &Matrix) -> Result<(DVector<f64>, Matrix), Error> {
     let eigen = view(matrix)
         .self_adjoint_eigen(Side::Lower)
@@ -144,14 +148,15 @@ pub(crate) fn eigen(
     ))
 }
 
-/// Solves `matrix x = right` with a symmetric matrix, whose lower triangle is read; `None` where it is not positive.
+/// Solves `matrix x = right` for a symmetric matrix, of which the lower triangle is used; `None` if it is not positive
+/// definite.
 pub(crate) fn solve_positive(matrix: &Matrix, right: &DVector<f64>) -> Option<DVector<f64>> {
     let right = MatRef::from_column_major_slice(right.as_slice(), right.len(), 1);
     let found = view(matrix).llt(Side::Lower).ok()?.solve(right);
     Some(DVector::from_fn(found.nrows(), |i, _| found[(i, 0)]))
 }
 
-/// Solves `matrix x = right`; `None` where the matrix is singular. Nothing to solve is solved.
+/// Solves `matrix x = right`; `None` if the matrix is singular. The solution of an empty system is empty.
 pub(crate) fn solve<T: nalgebra::ComplexField>(
     matrix: nalgebra::DMatrix<T>,
     right: &nalgebra::DMatrix<T>,

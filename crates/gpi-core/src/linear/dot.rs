@@ -1,6 +1,6 @@
-//! Products of vectors.
+//! The dot product of vectors.
 
-/// The dot product, in eight independent sums that the compiler can keep in vector registers.
+/// The dot product, computed with eight independent sums that the compiler can keep in vector registers.
 pub(crate) fn dot(left: &[f64], right: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (left, right) = (left.chunks_exact(8), right.chunks_exact(8));

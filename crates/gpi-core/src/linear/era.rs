@@ -1,42 +1,65 @@
-//! The eigensystem realization algorithm: from Markov parameters to a state space.
+//! The eigensystem realization algorithm (ERA): from Markov parameters to a state space.
 
 use super::StateSpace;
 use super::decompose::{Svd, eigen, leading_svd, svd};
 use crate::{Error, Matrix};
 use num_complex::Complex64;
 
-/// What [`realize`] may choose and what is given.
+/// Largest dimension of a Hankel matrix whose size is not given: larger ones are less accurate for noisy taps.
+const LARGEST: usize = 300;
+
+/// From this dimension on, and for at most [`FEW`] singular values, computing the leading ones only is faster.
+const LARGE: usize = 100;
+const FEW: usize = 12;
+
+/// Singular values below this fraction of the largest are rounding errors.
+const ROUNDING: f64 = 1e-14;
+
+/// Singular values below this fraction of the largest are not searched for a gap: the part of the response that they
+/// describe is below 1 %.
+const SIGNIFICANT: f64 = 0.01;
+
+/// A ratio of consecutive singular values that marks the order: those of noise decay slowly, without such a gap.
+const GAP: f64 = 20.0;
+
+/// Without a gap, the order is the smallest for which the rest holds at most this fraction of the sum of squares: 1 % in
+/// amplitude.
+const REST: f64 = 1e-4;
+
+/// Poles are kept inside the unit circle by this margin: a transient of 10^6 samples outlasts a usual record.
+const MARGIN: f64 = 1e-6;
+
+/// Options of [`realize`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EraOptions {
-    /// Number of states; chosen from the singular values when `None`.
+    /// Number of states; chosen from the singular values if `None`.
     pub order: Option<usize>,
-    /// Block rows and block columns of the Hankel matrix; `None` takes `(taps - 1) / 2 - 1`, but no
-    /// more than 300 rows or columns: longer ones cost accuracy on noisy taps.
+    /// Number of block rows and of block columns of the Hankel matrix; `(taps - 1) / 2 - 1` if `None`, but at most 300
+    /// rows or columns, because larger matrices are less accurate for noisy taps.
     pub blocks: Option<usize>,
 }
 
-/// A realization and what its order rests on.
+/// A realization, with the singular values that its order was chosen from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Era {
-    /// The realized model, balanced: both Gramians of the finite Hankel matrix are diag(s).
+    /// The realized model, which is balanced: both Gramians of the finite Hankel matrix are diag(s).
     pub system: StateSpace,
-    /// Singular values of the block Hankel matrix, descending: all, or as many as the order where this was given and
-    /// the matrix is so large that no others were worked out.
+    /// Singular values of the block Hankel matrix, descending: all of them, or as many as the order if this was given and
+    /// the matrix is large.
     pub singular_values: Vec<f64>,
-    /// Unstable poles that were reflected into the unit circle. They come from noise in the taps; a
-    /// mode that matters would have made the taps grow.
+    /// Number of unstable poles that were reflected into the unit circle. They result from noise in the taps, because a
+    /// true unstable mode would make the taps grow.
     pub reflected: usize,
 }
 
-/// Realizes Markov parameters H_0, H_1, .. (each outputs x inputs) as a stable state space.
+/// Realizes Markov parameters H_0, H_1, .., each (outputs, inputs), as a stable state space.
 ///
-/// With the singular value decomposition `U S V^T` of the block Hankel matrix `[H_{i+j+1}]` and the
-/// shifted one `[H_{i+j+2}]`: `A = S^-1/2 U^T [H_{i+j+2}] V S^-1/2`, `B = S^1/2 V^T E_1`,
-/// `C = E_1^T U S^1/2`, `D = H_0` (Ho and Kalman 1966; Juang 1994, chapter 5), (T1) in the
-/// documentation's theory.
+/// With the singular value decomposition `U S V^T` of the block Hankel matrix `[H_{i+j+1}]` and the shifted matrix
+/// `[H_{i+j+2}]`: `A = S^-1/2 U^T [H_{i+j+2}] V S^-1/2`, `B = S^1/2 V^T E_1`, `C = E_1^T U S^1/2`, `D = H_0` (Ho and
+/// Kalman 1966; Juang 1994, chapter 5), (T1) in the documentation's theory.
 ///
-/// A given order is kept. Otherwise the order is where the singular values fall by a factor of 20 at
-/// once, or else where the rest holds less than 1e-4 of the sum of their squares.
+/// If the order is not given, it is the place where the singular values fall by a factor of 20. If there is no such place,
+/// it is the smallest order for which the rest holds at most 1e-4 of the sum of squares.
 ///
 /// ```
 /// use gpi_core::linear::{EraOptions, TransferFunction, realize};
@@ -48,7 +71,7 @@ pub struct Era {
 /// ```
 ///
 /// # Errors
-/// Too few taps for the order or the blocks, taps of unequal size or not finite, a realization that
+/// There are too few taps for the order or the blocks, the taps differ in size or are not finite, or the realization
 /// cannot be made stable.
 pub fn realize(markov: &[Matrix], options: &EraOptions) -> Result<Era, Error> {
     let hankel = Hankel::of_order(markov, options.blocks, options.order)?;
@@ -63,14 +86,7 @@ pub(crate) struct Hankel {
 }
 
 impl Hankel {
-    /// Largest dimension of a Hankel matrix whose size is not given.
-    const LARGEST: usize = 300;
-
-    /// From this size on the leading singular values are faster found than all, if they are few.
-    const LARGE: usize = 100;
-    const FEW: usize = 12;
-
-    /// Decomposed whole, for any order.
+    /// The full decomposition, for any order.
     pub(crate) fn new(markov: &[Matrix], blocks: Option<usize>) -> Result<Self, Error> {
         Self::of_order(markov, blocks, None)
     }
@@ -81,30 +97,22 @@ impl Hankel {
         order: Option<usize>,
     ) -> Result<Self, Error> {
         let taps = markov.len();
-        if taps < 3 {
-            let purpose = "Markov parameters for a Hankel matrix".to_owned();
-            return Err(Error::TooFewSamples { samples: taps, needed: 3, purpose });
-        }
+        Error::require_samples(taps, 3, "Markov parameters for a Hankel matrix")?;
         let (outputs, inputs) = markov[0].shape();
-        if outputs == 0 || inputs == 0 {
-            let requirement = "outputs x inputs of a tap; at least one of each is needed";
-            return Err(Error::parameter("markov", format!("{outputs} x {inputs}"), requirement));
-        }
-        let longest = (Self::LARGEST / outputs.max(inputs)).max(1);
+        let requirement = "outputs x inputs of a tap; at least one of each is needed";
+        let size = format!("{outputs} x {inputs}");
+        Error::require(outputs > 0 && inputs > 0, "markov", size, requirement)?;
+        let longest = (LARGEST / outputs.max(inputs)).max(1);
         let blocks = blocks.unwrap_or(((taps - 1) / 2).saturating_sub(1).clamp(1, longest));
-        if blocks == 0 || taps < 2 * blocks + 1 {
-            let requirement =
-                format!("{taps} taps allow between 1 and {} Hankel blocks", (taps - 1) / 2);
-            return Err(Error::parameter("blocks", blocks, requirement));
-        }
+        let most = (taps - 1) / 2;
+        let requirement = format!("{taps} taps allow between 1 and {most} Hankel blocks");
+        Error::require((1..=most).contains(&blocks), "blocks", blocks, requirement)?;
         for tap in markov {
             Error::require_equal("outputs", ("H_0", outputs), ("another tap", tap.nrows()))?;
             Error::require_equal("inputs", ("H_0", inputs), ("another tap", tap.ncols()))?;
-            if let Some(value) = tap.iter().find(|value| !value.is_finite()) {
-                return Err(Error::parameter("markov", value, "every element must be finite"));
-            }
+            Error::require_finite("markov", tap)?;
         }
-        // all taps one below the other: each block column of the Hankel matrix is a part of it
+        // each block column of the Hankel matrix is a part of the stacked taps
         let mut stacked = Matrix::zeros(taps * outputs, inputs);
         for (lag, tap) in markov.iter().enumerate() {
             stacked.rows_mut(lag * outputs, outputs).copy_from(tap);
@@ -118,36 +126,35 @@ impl Hankel {
             matrix
         };
         let first = hankel(1);
-        let is_large = blocks * outputs.min(inputs) >= Self::LARGE;
-        let few = order.filter(|&order| is_large && (1..=Self::FEW).contains(&order));
+        let is_large = blocks * outputs.min(inputs) >= LARGE;
+        let few = order.filter(|&order| is_large && (1..=FEW).contains(&order));
         let leading = few.and_then(|order| leading_svd(&first, order));
         let decomposition = leading.map_or_else(|| svd(&first), Ok)?;
         Ok(Self { decomposition, shifted: hankel(2), direct: markov[0].clone() })
     }
 
-    /// How many singular values are above rounding.
+    /// Numerical rank: the number of singular values above rounding errors.
     pub(crate) fn rank(&self) -> usize {
-        self.significant(1e-14)
+        self.significant(ROUNDING)
     }
 
-    /// How many singular values are above a fraction of the largest.
+    /// The number of singular values above a fraction of the largest.
     pub(crate) fn significant(&self, fraction: f64) -> usize {
         let s = &self.decomposition.s;
         s.iter().take_while(|&&value| value > fraction * s[0] && value > 0.0).count()
     }
 
-    /// The order at which the singular values fall off.
+    /// The order that the singular values suggest, see [`realize`].
     pub(crate) fn suggested_order(&self) -> usize {
         choose_order(&self.decomposition.s[..self.rank()])
     }
 
+    /// The balanced realization of an order, with unstable poles reflected.
     pub(crate) fn realize(&self, order: usize) -> Result<Era, Error> {
         let rank = self.rank();
-        if order > rank {
-            let requirement =
-                format!("the Hankel matrix has rank {rank}; ask for at most that many states");
-            return Err(Error::parameter("order", order, requirement));
-        }
+        let requirement =
+            format!("the Hankel matrix has rank {rank}; use at most that many states");
+        Error::require(order <= rank, "order", order, requirement)?;
         let Svd { u, s, v } = &self.decomposition;
         let (outputs, inputs) = self.direct.shape();
         let root = |state: usize| s[state].sqrt();
@@ -161,10 +168,10 @@ impl Hankel {
     }
 }
 
-/// The order at which the singular values (descending, positive) fall off.
+/// The order that positive singular values, descending, suggest.
 fn choose_order(s: &[f64]) -> usize {
-    let significant = s.iter().take_while(|&&value| value >= 0.01 * s[0]).count();
-    let gap = (1..=significant).find(|&n| n == s.len() || s[n - 1] >= 20.0 * s[n]);
+    let significant = s.iter().take_while(|&&value| value >= SIGNIFICANT * s[0]).count();
+    let gap = (1..=significant).find(|&n| n == s.len() || s[n - 1] >= GAP * s[n]);
     if let Some(order) = gap {
         return order;
     }
@@ -172,15 +179,13 @@ fn choose_order(s: &[f64]) -> usize {
     let mut rest = total;
     let cut = s.iter().position(|value| {
         rest -= value * value;
-        rest <= 1e-4 * total
+        rest <= REST * total
     });
     cut.map_or(s.len(), |index| index + 1)
 }
 
-/// Reflects unstable eigenvalues of `a` at the unit circle: z becomes 1 / conj(z).
+/// Reflects unstable eigenvalues of `a` at the unit circle: z becomes 1 / conj(z). Returns their number too.
 fn stabilize(a: Matrix) -> Result<(Matrix, usize), Error> {
-    /// Poles are kept this far inside: below it a transient outlasts any record.
-    const MARGIN: f64 = 1e-6;
     if a.is_empty() {
         return Ok((a, 0));
     }
@@ -196,7 +201,7 @@ fn stabilize(a: Matrix) -> Result<(Matrix, usize), Error> {
     });
     let scaled = &vectors * nalgebra::DMatrix::<Complex64>::from_diagonal(&stable);
     let modulus = values.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
-    let remedy = "its poles are defective and cannot be reflected; ask for another order";
+    let remedy = "its poles are defective and cannot be reflected; use another order";
     let inverse = vectors.try_inverse().ok_or(Error::Unstable { modulus, remedy })?;
     let mended = (scaled * inverse).map(|value| value.re);
     let radius = super::decompose::eigenvalues(&mended)?;

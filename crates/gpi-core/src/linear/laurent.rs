@@ -1,23 +1,35 @@
-//! The noncausal FIR inverse: running stable dynamics backwards, whatever their zeros.
+//! The noncausal FIR inverse of stable dynamics, with zeros inside or outside the unit circle.
+//!
+//! On the annulus that contains the unit circle, `G^-1(z) = sum_i h_i z^-i` (45) with matrices h_i (inputs, outputs), the
+//! Fourier coefficients of `G^-1(e^{jw})`. They are computed by a discrete Fourier transform of N points, which gives the
+//! periodic sum `sum_m h_{i + m N}`. The coefficients decay as `rho^|i|`, where rho is the largest modulus of a zero
+//! inside the circle or of the inverse of a zero outside, so N follows from rho and the accepted error.
 
 use super::StateSpace;
 use super::decompose::solve;
 use crate::{Error, Matrix};
 use num_complex::Complex64;
+use rustfft::{Fft, FftPlanner};
 use std::ops::Range;
 
-/// Zeros nearer than this to the unit circle are refused: the inverse would ring for more than about
-/// 10^5 samples.
+/// Smallest accepted distance of a zero from the unit circle: nearer zeros would make the inverse longer than about 10^5
+/// samples.
 pub const ZERO_TOLERANCE: f64 = 1e-4;
 
-/// How much of the Laurent series is kept.
+/// Aliasing error, as a fraction of the truncation tolerance and absolute: it must not contribute to the truncation error.
+const ALIASING: (f64, f64) = (1e-3, 1e-15);
+
+/// Least decay rho of the Laurent coefficients that is assumed: a few more points than needed for zeros near the origin.
+const SLOWEST: f64 = 0.5;
+
+/// The truncation of the Laurent series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseOptions {
-    /// r, the number of causal taps besides tap 0; chosen from `tolerance` when `None`.
+    /// r, the number of causal taps besides tap 0; chosen from `tolerance` if `None`.
     pub causal: Option<usize>,
-    /// d, the number of noncausal taps (preview); chosen from `tolerance` when `None`.
+    /// d, the number of noncausal taps (the preview in samples); chosen from `tolerance` if `None`.
     pub noncausal: Option<usize>,
-    /// Largest truncation error accepted when r or d is chosen.
+    /// Largest truncation error ([`NoncausalFir::error`]) for the choice of r and d.
     pub tolerance: f64,
 }
 
@@ -27,33 +39,32 @@ impl Default for InverseOptions {
     }
 }
 
-/// The truncated Laurent series of G^-1 on the annulus of the unit circle, equation (46):
+/// The truncated Laurent series of G^-1 on the annulus that contains the unit circle, equation (46) of the paper:
 /// `v(k) = sum_{i=-d}^{r} h_i y(k-i)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoncausalFir {
     /// h_{-d} .. h_r, each (inputs, outputs) of G.
     pub taps: Vec<Matrix>,
-    /// d: how many samples of the future the inverse looks at.
+    /// d, the number of future samples that the inverse needs.
     pub noncausal: usize,
-    /// What was cut off: the sum of the norms of the taps left out, as a fraction of the sum over
-    /// all taps. It bounds the relative error of the frequency response, (T2) in the documentation's theory.
+    /// Truncation error: the sum of the norms of the omitted taps, as a fraction of the sum over all taps. It bounds the
+    /// relative error of the frequency response, (T2) in the documentation's theory.
     pub error: f64,
 }
 
-/// An intermediate signal seen through the inverse, with the samples where it can be trusted.
+/// An estimate of the intermediate signal v, with the range in which it is valid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IntermediateSignal {
-    /// v-hat, (samples, inputs of G); near the ends the output is continued by its end values.
+    /// v-hat, (samples, inputs of G). Before its first and after its last sample, the output is taken as constant.
     pub values: Matrix,
-    /// The samples whose inverse saw measured outputs only.
+    /// The samples that depend on measured outputs only.
     pub valid: Range<usize>,
 }
 
 impl StateSpace {
     /// The noncausal FIR approximation of G^-1, equations (45) and (46) of the paper.
     ///
-    /// The coefficients of the Laurent series on the unit circle are the Fourier coefficients of
-    /// 1 / G(e^{jw}); strictly proper and nonminimum-phase G lead to noncausal taps.
+    /// A strictly proper or nonminimum-phase G leads to noncausal taps.
     ///
     /// ```
     /// use gpi_core::linear::{InverseOptions, TransferFunction};
@@ -65,83 +76,58 @@ impl StateSpace {
     /// ```
     ///
     /// # Errors
-    /// Unequal numbers of inputs and outputs, a zero within [`ZERO_TOLERANCE`] of the unit circle, an
-    /// unstable G, a tolerance outside (0, 1).
+    /// The numbers of inputs and outputs differ, a zero is within [`ZERO_TOLERANCE`] of the unit circle, G is unstable, or
+    /// the tolerance is outside (0, 1).
     pub fn noncausal_inverse(&self, options: &InverseOptions) -> Result<NoncausalFir, Error> {
         Error::require_equal("channels", ("inputs", self.inputs()), ("outputs", self.outputs()))?;
-        if !(options.tolerance > 0.0 && options.tolerance < 1.0) {
-            let requirement = "must lie between 0 and 1";
-            return Err(Error::parameter("tolerance", options.tolerance, requirement));
-        }
+        let tolerance = options.tolerance;
+        let is_valid = tolerance > 0.0 && tolerance < 1.0;
+        Error::require(is_valid, "tolerance", tolerance, "must lie between 0 and 1")?;
         let modulus = self.spectral_radius()?;
         if modulus >= 1.0 {
-            let remedy = "only stable dynamics are run backwards";
-            return Err(Error::Unstable { modulus, remedy });
+            return Err(unstable(modulus));
         }
-        let mut slowest = 0.5_f64;
+        let mut slowest = SLOWEST;
         for zero in self.zeros()? {
             let distance = (zero.norm() - 1.0).abs();
             if distance < ZERO_TOLERANCE {
-                let frequency = zero.arg().abs();
-                let tolerance = ZERO_TOLERANCE;
-                return Err(Error::ZeroOnUnitCircle { distance, frequency, tolerance });
+                return Err(zero_on_circle(distance, zero.arg().abs()));
             }
             slowest = slowest.max(zero.norm().min(1.0 / zero.norm()));
         }
-        // The series decays as slowest^|i|; aliasing on a grid of N points is slowest^(N/2).
-        let decay = (1e-3 * options.tolerance).min(1e-15).ln() / slowest.ln();
+        // aliasing of N points is slowest^(N/2)
+        let decay = (ALIASING.0 * tolerance).min(ALIASING.1).ln() / slowest.ln();
         let window = options.causal.unwrap_or(0) + options.noncausal.unwrap_or(0) + self.order();
         let size = (2.0 * decay) as usize + 2 * window + 16;
         let series = self.laurent_series(size.next_power_of_two())?;
         Ok(truncate(&series, options))
     }
 
-    /// Laurent coefficients of G^-1 for lags 0, 1, .., then negative ones from the end; `size` is a
-    /// power of two.
+    /// The Laurent coefficients of G^-1 for the lags 0, 1, .., followed by those for the negative lags, the last of which
+    /// is -1; `size` is a power of two.
     fn laurent_series(&self, size: usize) -> Result<Vec<Matrix>, Error> {
-        let channels = self.inputs();
-        let mut planner = rustfft::FftPlanner::new();
-        let forward = planner.plan_fft_forward(size);
-        let mut response = vec![nalgebra::DMatrix::<Complex64>::zeros(channels, channels); size];
-        let folded = self.folded_response(size)?;
-        for (row, column) in (0..channels).flat_map(|i| (0..channels).map(move |j| (i, j))) {
-            let mut buffer: Vec<Complex64> =
-                folded.iter().map(|tap| Complex64::new(tap[(row, column)], 0.0)).collect();
-            forward.process(&mut buffer);
-            for (matrix, value) in response.iter_mut().zip(buffer) {
-                matrix[(row, column)] = value;
-            }
-        }
-        for (line, matrix) in response.iter_mut().enumerate() {
+        let complex = |tap: &Matrix| tap.map(Complex64::from);
+        let mut series: Vec<_> = self.folded_response(size)?.iter().map(complex).collect();
+        let mut planner = FftPlanner::new();
+        transform(&mut series, &*planner.plan_fft_forward(size));
+        for (line, matrix) in series.iter_mut().enumerate() {
             if !matrix.try_inverse_mut() {
-                let frequency = std::f64::consts::TAU * line as f64 / size as f64;
-                let tolerance = ZERO_TOLERANCE;
-                return Err(Error::ZeroOnUnitCircle { distance: 0.0, frequency, tolerance });
+                return Err(zero_on_circle(0.0, std::f64::consts::TAU * line as f64 / size as f64));
             }
         }
-        let backward = planner.plan_fft_inverse(size);
-        let mut series = vec![Matrix::zeros(channels, channels); size];
-        for (row, column) in (0..channels).flat_map(|i| (0..channels).map(move |j| (i, j))) {
-            let mut buffer: Vec<Complex64> = response.iter().map(|m| m[(row, column)]).collect();
-            backward.process(&mut buffer);
-            for (tap, value) in series.iter_mut().zip(&buffer) {
-                tap[(row, column)] = value.re / size as f64;
-            }
-        }
-        Ok(series)
+        transform(&mut series, &*planner.plan_fft_inverse(size));
+        Ok(series.iter().map(|tap| tap.map(|value| value.re / size as f64)).collect())
     }
 
-    /// The impulse response folded to one period, `sum_m H_{k + m size}`: its discrete Fourier
-    /// transform is G on the grid exactly, however slowly the response decays.
+    /// The impulse response folded to one period, `sum_m H_{k + m size}`: its discrete Fourier transform is G on the grid
+    /// exactly, even if the response decays slowly.
     fn folded_response(&self, size: usize) -> Result<Vec<Matrix>, Error> {
         let mut power = self.a().clone();
         for _ in 0..size.trailing_zeros() {
             power = &power * &power;
         }
         let identity = Matrix::identity(self.order(), self.order());
-        let remedy = "only stable dynamics are run backwards";
-        let singular = Error::Unstable { modulus: 1.0, remedy };
-        let mut state = solve(identity - power, self.b()).ok_or(singular)?;
+        let mut state = solve(identity - power, self.b()).ok_or_else(|| unstable(1.0))?;
         let mut folded = vec![Matrix::zeros(self.outputs(), self.inputs()); size];
         for k in 1..=size {
             folded[k % size] += self.c() * &state;
@@ -152,22 +138,37 @@ impl StateSpace {
     }
 }
 
+/// The discrete Fourier transform of every entry of a series of square matrices.
+fn transform(series: &mut [nalgebra::DMatrix<Complex64>], fft: &dyn Fft<f64>) {
+    for entry in 0..series.first().map_or(0, nalgebra::DMatrix::len) {
+        let mut buffer: Vec<Complex64> = series.iter().map(|matrix| matrix[entry]).collect();
+        fft.process(&mut buffer);
+        series.iter_mut().zip(buffer).for_each(|(matrix, value)| matrix[entry] = value);
+    }
+}
+
+fn unstable(modulus: f64) -> Error {
+    Error::Unstable { modulus, remedy: "only stable dynamics have a stable inverse" }
+}
+
+fn zero_on_circle(distance: f64, frequency: f64) -> Error {
+    Error::ZeroOnUnitCircle { distance, frequency, tolerance: ZERO_TOLERANCE }
+}
+
 /// Keeps the taps -d..=r of a periodic series.
 fn truncate(series: &[Matrix], options: &InverseOptions) -> NoncausalFir {
     let size = series.len();
     let norms: Vec<f64> = series.iter().map(Matrix::norm).collect();
     let total: f64 = norms.iter().sum();
-    // Each side may cut half of the tolerance.
+    // each side may omit half of the tolerance
     let allowed = 0.5 * options.tolerance * total;
     let shortest = |tail: &mut dyn Iterator<Item = f64>, longest: usize| {
         let mut sum = 0.0;
-        longest
-            - tail
-                .take_while(|norm| {
-                    sum += norm;
-                    sum <= allowed
-                })
-                .count()
+        let is_omitted = |norm: &f64| {
+            sum += norm;
+            sum <= allowed
+        };
+        longest - tail.take_while(is_omitted).count()
     };
     let half = size / 2;
     let causal = options
@@ -183,23 +184,21 @@ fn truncate(series: &[Matrix], options: &InverseOptions) -> NoncausalFir {
 }
 
 impl NoncausalFir {
-    /// r: how many samples of the past the inverse looks at.
+    /// r, the number of past samples that the inverse needs.
     pub fn causal(&self) -> usize {
         self.taps.len() - 1 - self.noncausal
     }
 
-    /// The intermediate signal of a measured output (samples, outputs), equation (47).
+    /// The intermediate signal v-hat for a measured `output` (samples, outputs), equation (47) of the paper.
     ///
     /// # Errors
-    /// An output with another number of channels, or shorter than the inverse.
+    /// The output has another number of channels than G, or is shorter than the inverse.
     pub fn apply(&self, output: &Matrix) -> Result<IntermediateSignal, Error> {
         let (inputs, outputs) = self.taps[0].shape();
         Error::require_equal("channels", ("output", output.ncols()), ("G", outputs))?;
         let samples = output.nrows();
-        if samples < self.taps.len() {
-            let purpose = format!("{} taps of the inverse", self.taps.len());
-            return Err(Error::TooFewSamples { samples, needed: self.taps.len(), purpose });
-        }
+        let taps = self.taps.len();
+        Error::require_samples(samples, taps, format!("{taps} taps of the inverse"))?;
         let mut values = Matrix::zeros(samples, inputs);
         let last = samples as isize - 1;
         for (index, tap) in self.taps.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Least squares from normal equations, with rank and condition, free or non-negative.
+//! Least squares from normal equations, with bounds on the unknowns.
 
 use super::decompose::solve_positive;
 use crate::Matrix;
@@ -6,19 +6,32 @@ use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DVector;
 
-/// Normal equations `gram x = rhs` of a least squares problem, gathered without its regressor.
+type Vector = DVector<f64>;
+
+/// Relative increase of the diagonal of the Gram matrix: far below what data determine, and above the rounding error of
+/// the sums of squares.
+const REGULARIZATION: f64 = 1e-14;
+
+/// A gradient below this fraction of the largest right side counts as zero: above its rounding error, so that rounding
+/// does not free an unknown at its bound.
+const SLACK: f64 = 1e-12;
+
+/// With more unknowns than this, faer's blocked Cholesky decomposition is faster, at the cost of megabytes of workspace.
+const LARGE: usize = 300;
+
+/// The normal equations `gram x = rhs` of a least squares problem, accumulated without storing its regressor.
 #[derive(Clone, Debug)]
 pub(crate) struct NormalEquations {
-    /// Regressor's transpose times regressor, (unknowns, unknowns).
+    /// `A^T A` for the regressor A, (unknowns, unknowns).
     pub gram: Matrix,
-    /// Regressor's transpose times targets, (unknowns, targets).
+    /// `A^T y` for the targets y, (unknowns, targets).
     pub rhs: Matrix,
     /// Sum of squares of each target.
-    pub squares: DVector<f64>,
+    pub squares: Vector,
 }
 
 impl NormalEquations {
-    /// No equation yet.
+    /// A problem without equations.
     pub(crate) fn zeros(unknowns: usize, targets: usize) -> Self {
         Self {
             gram: Matrix::zeros(unknowns, unknowns),
@@ -37,7 +50,7 @@ impl NormalEquations {
     }
 
     /// Sum of squared residuals of each target at `x`.
-    pub(crate) fn residual_squares(&self, x: &Matrix) -> DVector<f64> {
+    pub(crate) fn residual_squares(&self, x: &Matrix) -> Vector {
         DVector::from_fn(self.squares.len(), |target, _| {
             let x = x.column(target);
             let fitted = (&self.gram * x).dot(&x);
@@ -46,7 +59,7 @@ impl NormalEquations {
     }
 }
 
-/// Adds `factor factor^T`: half of it by products, the other half by symmetry.
+/// Adds `factor factor^T`: computes the lower triangle and copies it to the upper one.
 fn add_squares(gram: &mut Matrix, factor: &Matrix) {
     let (unknowns, rows) = factor.shape();
     let view = MatRef::from_column_major_slice(factor.as_slice(), unknowns, rows);
@@ -64,19 +77,12 @@ fn add_squares(gram: &mut Matrix, factor: &Matrix) {
     gram.fill_upper_triangle_with_lower_triangle();
 }
 
-/// Minimises `x^T gram x - 2 x^T rhs` over `lower <= x <= upper`, which contain zero (active set method
+/// Minimizes `x^T gram x - 2 x^T rhs` over `lower <= x <= upper`, an interval that contains zero (the active set method
 /// of Lawson and Hanson, with two bounds as by Stark and Parker).
 ///
-/// Bounds may be infinite. Unknowns are scaled to one size first, and what the equations leave open is
-/// drawn towards zero.
-pub(crate) fn bounded(
-    gram: &Matrix,
-    rhs: &DVector<f64>,
-    lower: &DVector<f64>,
-    upper: &DVector<f64>,
-) -> DVector<f64> {
-    /// Relative to the diagonal: far below what data determine, above the rounding of the squares.
-    const REGULARIZATION: f64 = 1e-14;
+/// Bounds may be infinite. The unknowns are scaled first, so that the diagonal of the Gram matrix is one. Unidentifiable
+/// combinations of unknowns are close to zero.
+pub(crate) fn bounded(gram: &Matrix, rhs: &Vector, lower: &Vector, upper: &Vector) -> Vector {
     let scale = gram.diagonal().map(|square| if square > 0.0 { square.sqrt() } else { 1.0 });
     let n = rhs.len();
     let mut scaled = Matrix::from_fn(n, n, |i, j| gram[(i, j)] / (scale[i] * scale[j]));
@@ -88,31 +94,21 @@ pub(crate) fn bounded(
     active_set(&scaled, &target, &lower, &upper).component_div(&scale)
 }
 
-fn active_set(
-    gram: &Matrix,
-    rhs: &DVector<f64>,
-    lower: &DVector<f64>,
-    upper: &DVector<f64>,
-) -> DVector<f64> {
+fn active_set(gram: &Matrix, rhs: &Vector, lower: &Vector, upper: &Vector) -> Vector {
     let n = rhs.len();
     let mut x = DVector::zeros(n);
-    // All that may move are free at first; weights that want to fall below zero are caught one by one.
+    // all unknowns are free at first; those beyond a bound are fixed to it one by one
     let mut passive: Vec<bool> = (0..n).map(|i| lower[i] < upper[i]).collect();
-    let slack = 1e-12 * rhs.amax();
-    // Each change of the active set lowers the cost; the bound guards against cycling by rounding.
+    let slack = SLACK * rhs.amax();
+    // each change of the active set lowers the cost; the limit prevents cycling due to rounding
     for _ in 0..3 * n.max(1) {
         while passive.iter().any(|&free| free) {
             let target = passive_solution(gram, rhs, &x, &passive);
             let mut fraction = 1.0;
             let mut blocking = None;
-            for i in (0..n).filter(|&i| passive[i]) {
-                let bound = if target[i] < lower[i] {
-                    lower[i]
-                } else if target[i] > upper[i] {
-                    upper[i]
-                } else {
-                    continue;
-                };
+            let is_beyond = |&i: &usize| target[i] < lower[i] || target[i] > upper[i];
+            for i in (0..n).filter(|&i| passive[i]).filter(is_beyond) {
+                let bound = target[i].clamp(lower[i], upper[i]);
                 let step = (bound - x[i]) / (target[i] - x[i]);
                 if step < fraction || blocking.is_none() {
                     (fraction, blocking) = (step.min(fraction), Some((i, bound)));
@@ -124,13 +120,10 @@ fn active_set(
             passive[i] = false;
         }
         let descent = rhs - gram * &x;
-        let inward = |i: usize| {
-            let (from_lower, from_upper) = (x[i] == lower[i], x[i] == upper[i]);
-            match (from_lower, from_upper) {
-                (true, false) => descent[i],
-                (false, true) => -descent[i],
-                _ => 0.0,
-            }
+        let inward = |i: usize| match (x[i] == lower[i], x[i] == upper[i]) {
+            (true, false) => descent[i],
+            (false, true) => -descent[i],
+            _ => 0.0,
         };
         let entering = (0..n).filter(|&i| !passive[i] && inward(i) > slack);
         match entering.max_by(|&i, &j| inward(i).total_cmp(&inward(j))) {
@@ -141,21 +134,14 @@ fn active_set(
     x
 }
 
-/// The minimum over the passive unknowns, the others held at `x`.
-fn passive_solution(
-    gram: &Matrix,
-    rhs: &DVector<f64>,
-    x: &DVector<f64>,
-    passive: &[bool],
-) -> DVector<f64> {
+/// The minimum over the passive (free) unknowns, with the others fixed at `x`.
+fn passive_solution(gram: &Matrix, rhs: &Vector, x: &Vector, passive: &[bool]) -> Vector {
     let free: Vec<usize> = (0..x.len()).filter(|&i| passive[i]).collect();
     let held = DVector::from_fn(x.len(), |i, _| if passive[i] { 0.0 } else { x[i] });
     let remaining = rhs - gram * held;
     let reduced = Matrix::from_fn(free.len(), free.len(), |i, j| gram[(free[i], free[j])]);
     let target = DVector::from_fn(free.len(), |i, _| remaining[free[i]]);
     let mut solution = x.clone();
-    /// From so many unknowns on faer's blocks are faster, which keep megabytes of workspace.
-    const LARGE: usize = 300;
     let values = if free.len() > LARGE {
         solve_positive(&reduced, &target)
     } else {

@@ -1,24 +1,20 @@
-//! The linear dynamics G: estimated, realized, simulated, and run backwards.
+//! The linear dynamics G: estimation of its impulse response, realization as a state space, simulation, and inversion.
 
 mod decompose;
 mod dot;
-mod double_double;
 mod era;
 mod fir;
-mod fir_statistic;
 mod laurent;
 mod least_squares;
 mod section;
 mod sections;
 mod state_space;
 mod transfer_function;
-mod triangular_factor;
 mod zero_order_hold;
 mod zeros;
 
 pub use era::{Era, EraOptions, realize};
-pub use fir::{Fir, estimate};
-pub use fir_statistic::FirStatistic;
+pub use fir::{Fir, FirStatistic, estimate};
 pub use laurent::{IntermediateSignal, InverseOptions, NoncausalFir, ZERO_TOLERANCE};
 pub use state_space::StateSpace;
 pub use transfer_function::TransferFunction;

@@ -5,15 +5,19 @@ use crate::{Error, Matrix};
 use nalgebra::DVector;
 use num_complex::Complex64;
 
+/// Samples whose states [`StateSpace::simulate_from`] stores at once, so that its products are matrix products.
+const BLOCK: usize = 1024;
+
 /// `x(k+1) = A x(k) + B v(k)`, `y(k) = C x(k) + D v(k)`.
 ///
-/// A is (order, order), B (order, inputs), C (outputs, order), D (outputs, inputs).
+/// A is (order, order), B (order, inputs), C (outputs, order) and D (outputs, inputs). The response to v is (15) of the
+/// paper, with the Markov parameters of [`StateSpace::markov`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StateSpace {
-    a: Matrix,
-    b: Matrix,
-    c: Matrix,
-    d: Matrix,
+    pub(super) a: Matrix,
+    pub(super) b: Matrix,
+    pub(super) c: Matrix,
+    pub(super) d: Matrix,
 }
 
 impl StateSpace {
@@ -28,7 +32,7 @@ impl StateSpace {
     /// ```
     ///
     /// # Errors
-    /// Matrices whose sizes do not fit, or with elements that are not finite.
+    /// The sizes of the matrices do not match, or an element is not finite.
     pub fn new(a: Matrix, b: Matrix, c: Matrix, d: Matrix) -> Result<Self, Error> {
         Error::require_equal("rows and columns", ("A", a.nrows()), ("A", a.ncols()))?;
         Error::require_equal("rows", ("A", a.nrows()), ("B", b.nrows()))?;
@@ -36,14 +40,12 @@ impl StateSpace {
         Error::require_equal("rows", ("C", c.nrows()), ("D", d.nrows()))?;
         Error::require_equal("columns", ("B", b.ncols()), ("D", d.ncols()))?;
         for (name, matrix) in [("A", &a), ("B", &b), ("C", &c), ("D", &d)] {
-            if let Some(value) = matrix.iter().find(|value| !value.is_finite()) {
-                return Err(Error::parameter(name, value, "every element must be finite"));
-            }
+            Error::require_finite(name, matrix)?;
         }
         Ok(Self { a, b, c, d })
     }
 
-    /// The static gain `y(k) = D v(k - delay)`, `delay` in samples.
+    /// The model `y(k) = gain v(k - delay)`, for a `gain` (outputs, inputs) and a `delay` in samples.
     pub fn delayed_gain(gain: &Matrix, delay: usize) -> Self {
         let (outputs, inputs) = gain.shape();
         if delay == 0 {
@@ -97,23 +99,21 @@ impl StateSpace {
         self.c.nrows()
     }
 
-    /// One sample: the output y(k) for v(k); `state` moves on from x(k) to x(k+1).
+    /// The output y(k) for one sample v(k); `state` changes from x(k) to x(k+1).
     pub fn step(&self, state: &mut DVector<f64>, input: &DVector<f64>) -> DVector<f64> {
         let output = &self.c * &*state + &self.d * input;
         *state = &self.a * &*state + &self.b * input;
         output
     }
 
-    /// The outputs (samples, outputs) for `input` (samples, inputs); `state` is x(0) and becomes the
-    /// state after the last sample.
+    /// The outputs (samples, outputs) for `input` (samples, inputs); `state` changes from x(0) to the state after the
+    /// last sample.
     ///
     /// # Errors
-    /// An input with another number of channels, a state of another length.
+    /// The input has another number of channels, or the state another length, than the model.
     pub fn simulate_from(&self, state: &mut DVector<f64>, input: &Matrix) -> Result<Matrix, Error> {
         Error::require_equal("channels", ("input", input.ncols()), ("B", self.inputs()))?;
         Error::require_equal("states", ("state", state.len()), ("A", self.order()))?;
-        /// Samples whose states are held at once.
-        const BLOCK: usize = 1024;
         let samples = input.nrows();
         let mut output = Matrix::zeros(samples, self.outputs());
         let mut next = state.clone();
@@ -134,41 +134,37 @@ impl StateSpace {
         Ok(output)
     }
 
-    /// The outputs from rest, x(0) = 0.
+    /// The outputs (samples, outputs) for `input` (samples, inputs) and the initial state x(0) = 0.
     ///
     /// # Errors
-    /// An input with another number of channels.
+    /// The input has another number of channels than the model.
     pub fn simulate(&self, input: &Matrix) -> Result<Matrix, Error> {
         self.simulate_from(&mut DVector::zeros(self.order()), input)
     }
 
-    /// The state x in which the constant input `v` keeps the model: `x = A x + B v`; zero where a
-    /// pole at z = 1 leaves no such state.
+    /// The steady state x for the constant input `v`, `x = A x + B v`; zero if a pole at z = 1 leaves no steady state.
     pub fn equilibrium(&self, input: &DVector<f64>) -> DVector<f64> {
-        let identity = Matrix::identity(self.order(), self.order());
-        let driven = Matrix::from_columns(&[&self.b * input]);
-        match solve(identity - &self.a, &driven) {
-            Some(state) => state.column(0).into_owned(),
-            None => DVector::zeros(self.order()),
-        }
+        let states = self.steady_states(&Matrix::from_columns(&[&self.b * input]));
+        states.map_or_else(|| DVector::zeros(self.order()), |x| x.column(0).into_owned())
     }
 
-    /// Markov parameters H_0 = D, H_j = C A^(j-1) B, each (outputs, inputs).
+    /// The solutions X of `X = A X + driven`; `None` for a pole at z = 1.
+    fn steady_states(&self, driven: &Matrix) -> Option<Matrix> {
+        solve(Matrix::identity(self.order(), self.order()) - &self.a, driven)
+    }
+
+    /// The first `count` Markov parameters `H_0 = D`, `H_j = C A^(j-1) B`, each (outputs, inputs).
     pub fn markov(&self, count: usize) -> Vec<Matrix> {
         let mut propagated = self.b.clone();
-        let mut markov = Vec::with_capacity(count);
-        for lag in 0..count {
-            if lag == 0 {
-                markov.push(self.d.clone());
-            } else {
-                markov.push(&self.c * &propagated);
-                propagated = &self.a * propagated;
-            }
-        }
-        markov
+        let later = (1..count).map(|_| {
+            let tap = &self.c * &propagated;
+            propagated = &self.a * &propagated;
+            tap
+        });
+        std::iter::once(self.d.clone()).chain(later).take(count).collect()
     }
 
-    /// The eigenvalues of A.
+    /// The poles: the eigenvalues of A.
     ///
     /// # Errors
     /// The eigendecomposition does not converge.
@@ -176,7 +172,7 @@ impl StateSpace {
         eigenvalues(&self.a)
     }
 
-    /// The largest modulus of a pole, zero for a static gain; below 1 the model is stable.
+    /// The largest modulus of a pole, zero for a static gain. The model is stable if it is below 1.
     ///
     /// # Errors
     /// The eigendecomposition does not converge.
@@ -184,41 +180,31 @@ impl StateSpace {
         Ok(self.poles()?.iter().map(|pole| pole.norm()).fold(0.0, f64::max))
     }
 
-    /// G(1), (outputs, inputs): the output that a constant input of 1 leads to.
+    /// The DC gain `G(1) = C (I - A)^-1 B + D`, (outputs, inputs): the steady-state output for a constant input of 1.
     ///
     /// # Errors
-    /// A pole at z = 1.
+    /// The model has a pole at z = 1.
     pub fn dc_gain(&self) -> Result<Matrix, Error> {
-        let identity = Matrix::identity(self.order(), self.order());
-        match solve(identity - &self.a, &self.b) {
-            Some(states) => Ok(&self.c * states + &self.d),
-            None => Err(Error::Unstable {
-                modulus: 1.0,
-                remedy: "a pole at z = 1 integrates and has no DC gain",
-            }),
-        }
+        let remedy = "a pole at z = 1 integrates and has no DC gain";
+        let states = self.steady_states(&self.b).ok_or(Error::Unstable { modulus: 1.0, remedy })?;
+        Ok(&self.c * states + &self.d)
     }
 
-    /// G(e^{jw}) at `frequencies` w in radians per sample, each (outputs, inputs).
+    /// The frequency response G(e^{jw}) at `frequencies` w in rad per sample, each (outputs, inputs); NaN at a pole.
     pub fn frequency_response(&self, frequencies: &[f64]) -> Vec<nalgebra::DMatrix<Complex64>> {
-        let complex = |matrix: &Matrix| matrix.map(|value| Complex64::new(value, 0.0));
-        let (a, b, c, d) = (complex(&self.a), complex(&self.b), complex(&self.c), complex(&self.d));
+        let [a, b, c, d] = [&self.a, &self.b, &self.c, &self.d].map(|m| m.map(Complex64::from));
         let response = |&frequency: &f64| {
             let mut resolvent = -a.clone();
             for state in 0..self.order() {
                 resolvent[(state, state)] += Complex64::from_polar(1.0, frequency);
             }
-            let nan = nalgebra::DMatrix::from_element(
-                self.order(),
-                self.inputs(),
-                Complex64::new(f64::NAN, 0.0),
-            );
-            &c * solve(resolvent, &b).unwrap_or(nan) + &d
+            let none = || b.map(|_| Complex64::from(f64::NAN));
+            &c * solve(resolvent, &b).unwrap_or_else(none) + &d
         };
         frequencies.iter().map(response).collect()
     }
 
-    /// The same model with input channel `input` multiplied by `gain`.
+    /// Multiplies the input channel `input` by `gain`: scales its columns of B and D.
     pub fn scale_input(&mut self, input: usize, gain: f64) {
         self.b.column_mut(input).scale_mut(gain);
         self.d.column_mut(input).scale_mut(gain);

@@ -4,10 +4,10 @@ use super::StateSpace;
 use crate::{Error, Matrix};
 use num_complex::Complex64;
 
-/// `G(z) = N(z) / d(z)`: polynomials in descending powers, as in (49) of the paper.
+/// `G(z) = N(z) / d(z)` with polynomials in descending powers, as in equation (49) of the paper.
 ///
-/// Every entry of N has as many coefficients as d. The variable is z for discrete time and s for
-/// continuous time; conversions to a state space are the same.
+/// Every entry of N has as many coefficients as d. The variable is z in discrete time and s in continuous time; the
+/// conversion to a state space is the same.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TransferFunction {
     /// Coefficients of N, highest power first, each (outputs, inputs).
@@ -17,7 +17,7 @@ pub struct TransferFunction {
 }
 
 impl TransferFunction {
-    /// A single-input, single-output transfer function; a shorter numerator is filled with zeros.
+    /// A single-input, single-output transfer function; leading zeros are added to a shorter numerator.
     ///
     /// ```
     /// use gpi_core::linear::TransferFunction;
@@ -27,13 +27,11 @@ impl TransferFunction {
     /// ```
     ///
     /// # Errors
-    /// A denominator that is empty or starts with zero, a numerator of higher degree.
+    /// The denominator is empty or starts with zero, or the numerator has a higher degree.
     pub fn new(numerator: &[f64], denominator: &[f64]) -> Result<Self, Error> {
         let leading = denominator.first().copied().unwrap_or(0.0);
-        if leading == 0.0 {
-            let requirement = "its highest power needs a coefficient other than 0";
-            return Err(Error::parameter("denominator", leading, requirement));
-        }
+        let requirement = "its highest power needs a coefficient other than 0";
+        Error::require(leading != 0.0, "denominator", leading, requirement)?;
         let Some(padding) = denominator.len().checked_sub(numerator.len()) else {
             let requirement = format!(
                 "the denominator has {} coefficients; a proper system has no more in its numerator",
@@ -48,7 +46,8 @@ impl TransferFunction {
         })
     }
 
-    /// The transfer function of a state space model; the denominator is the polynomial of its poles.
+    /// The transfer function of a state space model. The denominator is the characteristic polynomial of A, the numerator
+    /// its convolution with the Markov parameters.
     ///
     /// # Errors
     /// The eigendecomposition does not converge.
@@ -70,15 +69,15 @@ impl TransferFunction {
         Ok(Self { numerator: numerator.collect(), denominator })
     }
 
-    /// The controllable canonical form, its states scaled so that large coefficients (continuous
-    /// time in rad/s) do no harm.
+    /// The controllable canonical form. Its states are scaled, so that large coefficients (continuous time in rad/s) do
+    /// not reduce the accuracy.
     ///
     /// # Errors
-    /// Coefficients that are not finite, or so large that their scaled forms are not.
+    /// A coefficient is not finite, or so large that its scaled form is not.
     pub fn to_state_space(&self) -> Result<StateSpace, Error> {
         let degree = self.denominator.len() - 1;
         let (outputs, inputs) = self.numerator[0].shape();
-        // A bound of the roots' moduli: in units of it, all coefficients are at most 1.
+        // an upper bound of the roots' moduli: in its unit, all coefficients are at most 1
         let scaled = |(power, value): (usize, &f64)| value.abs().powf(1.0 / power as f64);
         let bound = self.denominator.iter().enumerate().skip(1).map(scaled).fold(0.0, f64::max);
         let scale = if bound > 0.0 { bound } else { 1.0 };
@@ -104,7 +103,7 @@ impl TransferFunction {
         StateSpace::new(a, b, c, d)
     }
 
-    /// G at a point of the complex plane, (outputs, inputs).
+    /// G(z) at a point z of the complex plane, (outputs, inputs).
     pub fn evaluate(&self, point: Complex64) -> nalgebra::DMatrix<Complex64> {
         let denominator = self
             .denominator

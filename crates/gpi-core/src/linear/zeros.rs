@@ -1,34 +1,35 @@
-//! Invariant zeros, by taking the infinite ones away first.
+//! Invariant zeros, by a reduction of the system that removes the infinite ones.
 
 use super::StateSpace;
 use super::decompose::{eigenvalues, full_svd, solve};
 use crate::{Error, Matrix};
 use num_complex::Complex64;
 
-/// Singular values below this fraction of the system's norm count as zero.
+/// Singular values below this fraction of the system's norm count as zero: above the rounding errors of the reduction,
+/// which uses orthogonal transformations only, and far below the coefficients of practical systems.
 const TOLERANCE: f64 = 1e-11;
 
 impl StateSpace {
-    /// The finite invariant zeros of a square model: where `[A - z I, B; C, D]` loses rank.
+    /// The finite invariant zeros of a square model: the z at which `[A - z I, B; C, D]` loses rank.
     ///
-    /// Outputs that do not see the input at once are replaced by what their derivative sees, until D
-    /// is invertible (Emami-Naeini and Van Dooren, Automatica 1982); then they are the eigenvalues of
-    /// `A - B D^-1 C`.
+    /// Outputs without direct feedthrough are replaced by their value one sample later, until D is invertible
+    /// (Emami-Naeini and Van Dooren, Automatica 1982). The zeros are then the eigenvalues of `A - B D^-1 C`.
+    ///
+    /// ```
+    /// use gpi_core::linear::TransferFunction;
+    /// let zeros = TransferFunction::new(&[1.0, -2.0], &[1.0, 0.0, 0.5])?.to_state_space()?.zeros()?;
+    /// assert!(zeros.len() == 1 && (zeros[0].re - 2.0).abs() < 1e-12);
+    /// # Ok::<(), gpi_core::Error>(())
+    /// ```
     ///
     /// # Errors
-    /// As many outputs as inputs are needed; a decomposition does not converge.
+    /// The numbers of inputs and outputs differ, or a decomposition does not converge.
     pub fn zeros(&self) -> Result<Vec<Complex64>, Error> {
         Error::require_equal("channels", ("inputs", self.inputs()), ("outputs", self.outputs()))?;
-        let pencil = Pencil {
-            a: self.a().clone(),
-            b: self.b().clone(),
-            c: self.c().clone(),
-            d: self.d().clone(),
-        };
-        let parts = [&pencil.a, &pencil.b, &pencil.c, &pencil.d];
+        let parts = [&self.a, &self.b, &self.c, &self.d];
         let tolerance = TOLERANCE * parts.into_iter().map(Matrix::norm).fold(0.0, f64::max);
-        // Once for the rows of D and, transposed, once for its columns.
-        let reduced = pencil.reduce(tolerance)?.transpose().reduce(tolerance)?;
+        // first for the rows of D, then, with the transposed system, for its columns
+        let reduced = self.clone().reduce(tolerance)?.transpose().reduce(tolerance)?;
         if reduced.a.is_empty() || reduced.d.nrows() != reduced.d.ncols() {
             return Ok(Vec::new());
         }
@@ -37,26 +38,14 @@ impl StateSpace {
             None => Ok(Vec::new()),
         }
     }
-}
 
-struct Pencil {
-    a: Matrix,
-    b: Matrix,
-    c: Matrix,
-    d: Matrix,
-}
-
-impl Pencil {
+    /// The system with the transposed system matrix.
     fn transpose(&self) -> Self {
-        Self {
-            a: self.a.transpose(),
-            b: self.c.transpose(),
-            c: self.b.transpose(),
-            d: self.d.transpose(),
-        }
+        let [a, b, c, d] = [&self.a, &self.c, &self.b, &self.d].map(Matrix::transpose);
+        Self { a, b, c, d }
     }
 
-    /// An equivalent pencil whose D has full row rank.
+    /// A system with the same finite zeros whose D has full row rank.
     fn reduce(mut self, tolerance: f64) -> Result<Self, Error> {
         let rank = |values: &[f64]| values.iter().filter(|&&value| value > tolerance).count();
         loop {
@@ -69,18 +58,18 @@ impl Pencil {
             if seen == outputs {
                 return Ok(self);
             }
-            // Rotate the outputs: the first ones see the input at once, the rest only states.
+            // rotated outputs: the first ones have direct feedthrough, the others depend on the state only
             let (c, d) = (direct.u.tr_mul(&self.c), direct.u.tr_mul(&self.d));
             let blind = c.rows(seen, outputs - seen).into_owned();
             let visible = full_svd(&blind)?;
             let fixed = rank(&visible.s);
             if fixed == 0 {
-                // outputs that are always zero say nothing
+                // the others are always zero and carry no information
                 self.c = c.rows(0, seen).into_owned();
                 self.d = d.rows(0, seen).into_owned();
                 return Ok(self);
             }
-            // Where those outputs stay zero, so do `fixed` states; their equations are new outputs.
+            // if these outputs stay zero, so do `fixed` states, whose equations become new outputs
             let free = states - fixed;
             let basis = Matrix::from_fn(states, states, |i, j| {
                 visible.v[(i, if j < free { fixed + j } else { j - free })]

@@ -1,10 +1,10 @@
-//! The generalized Prandtl-Ishlinskii operator: deadzones, then plays.
+//! The generalized Prandtl-Ishlinskii operator: deadzones followed by plays.
 
 use super::{Deadzones, DeadzonesState, IN_CACHE, Operator, PlayBank, PlayBankState, Storage};
 
-/// The cascade `v = P[D[u]]`, equation (1) of the paper.
+/// The generalized Prandtl-Ishlinskii operator `v = P[D[u]]`, equation (1) of the paper.
 ///
-/// `E` stores the envelope's parameters, `S` the bank's.
+/// `E` stores the parameters of the envelope D, `S` those of the bank of plays P.
 ///
 /// ```
 /// use gpi_core::operators::{Deadzones, Gpi, Operator, PlayBank, Reading};
@@ -19,7 +19,6 @@ use super::{Deadzones, DeadzonesState, IN_CACHE, Operator, PlayBank, PlayBankSta
 #[cfg_attr(
     feature = "identify",
     serde(bound(
-        serialize = "E: Clone + serde::Serialize, S: serde::Serialize",
         deserialize = "E: Storage + serde::Deserialize<'de>, S: serde::Deserialize<'de>"
     ))
 )]
@@ -28,7 +27,7 @@ pub struct Gpi<E, S> {
     plays: PlayBank<S>,
 }
 
-/// The state of a [`Gpi`]: its envelope's, then its plays'.
+/// The state of a [`Gpi`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
 pub struct GpiState<T, S> {
@@ -75,14 +74,6 @@ where
     fn step(&self, state: &mut Self::State, input: E::Item) -> E::Item {
         let z = self.envelope.step(&mut state.envelope, input);
         self.plays.step(&mut state.plays, z)
-    }
-
-    fn block(&self, state: &mut Self::State, input: &[E::Item], output: &mut [E::Item]) -> usize {
-        for (output, input) in output.chunks_mut(IN_CACHE).zip(input.chunks(IN_CACHE)) {
-            let samples = self.envelope.block(&mut state.envelope, input, output);
-            self.plays.in_place(&mut state.plays, &mut output[..samples]);
-        }
-        input.len().min(output.len())
     }
 
     fn in_place(&self, state: &mut Self::State, signal: &mut [E::Item]) {

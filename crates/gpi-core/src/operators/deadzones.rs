@@ -2,29 +2,29 @@
 
 use super::error::{require_finite, require_length};
 use super::storage::sum;
-use super::{IN_CACHE, Operator, OperatorError, Sample, Storage};
+use super::{Operator, OperatorError, Sample, Storage};
 
-/// How the deadzone Z_eta is read; the paper's text and its equation (3) disagree.
+/// The deadzone convention: the definition of Z_eta. The paper's text and its equation (3) disagree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "identify", serde(rename_all = "kebab-case"))]
 pub enum Reading {
-    /// Memoryless, as the text says: eta > 0: `max(u - eta, 0)`; eta < 0: `min(u - eta, 0)`;
-    /// eta = 0: `u`.
+    /// The memoryless deadzone that the paper's text describes:
+    /// `max(u - eta, 0)` if eta > 0, `min(u - eta, 0)` if eta < 0, and `u` if eta = 0.
     #[default]
     OneSided,
-    /// Equation (3) exactly as printed: `u - eta` while u rises above eta, `u + eta` while u falls
-    /// below -eta, 0 otherwise. It depends on the previous input, so it is not memoryless.
+    /// Equation (3) exactly as printed: `u - eta` if `u > eta` and u increases, `u + eta` if `u < -eta` and u
+    /// decreases, and 0 otherwise. It depends on the previous input, so it is not memoryless.
     Directional,
 }
 
 impl Reading {
-    /// Z_eta of one sample, without its weight; `previous` is u(k-1).
+    /// Z_eta for one sample, without its weight; `previous` is u(k-1).
     ///
     /// ```
     /// use gpi_core::operators::Reading;
     /// assert_eq!(Reading::OneSided.zone(1.0, 4.0, 3.0), 2.0);
-    /// assert_eq!(Reading::Directional.zone(1.0, 4.0, 3.0), 0.0); // u falls, but not below -1
+    /// assert_eq!(Reading::Directional.zone(1.0, 4.0, 3.0), 0.0); // u decreases, but not below -1
     /// ```
     #[inline]
     pub fn zone<T: Sample>(self, threshold: T, previous: T, input: T) -> T {
@@ -56,7 +56,8 @@ impl Reading {
 
 /// A weighted sum of deadzones, equation (2) of the paper: `z(k) = sum_j g_j Z_{eta_j}[u](k)`.
 ///
-/// Thresholds have the unit of the input; weights are slopes (unit of z per unit of u).
+/// Thresholds have the unit of the input. Weights are slopes, in units of z per unit of u. `S` is `[T; N]` on firmware
+/// or `Vec<T>` on a host; T is `f32` or `f64`.
 ///
 /// ```
 /// use gpi_core::operators::{Deadzones, Operator, Reading};
@@ -68,27 +69,26 @@ impl Reading {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "identify", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "identify", serde(try_from = "Parameters<S>", into = "Parameters<S>"))]
+#[cfg_attr(feature = "identify", serde(try_from = "Parameters<S>"))]
 #[cfg_attr(
     feature = "identify",
-    serde(bound(
-        serialize = "S: Clone + serde::Serialize",
-        deserialize = "S: Storage + serde::Deserialize<'de>"
-    ))
+    serde(bound(deserialize = "S: Storage + serde::Deserialize<'de>"))
 )]
 pub struct Deadzones<S> {
     pub(super) thresholds: S,
     pub(super) weights: S,
     reading: Reading,
-    /// The one-sided deadzone of each threshold is `u - clamp(u, lower, upper)`: which side it leaves out is known
-    /// beforehand, so that no sample has to ask.
+    /// The one-sided deadzone is `u - clamp(u, lower, upper)`. These bounds are computed once, so that `step` does not
+    /// branch on the sign of each threshold.
+    #[cfg_attr(feature = "identify", serde(skip_serializing))]
     lower: S,
+    #[cfg_attr(feature = "identify", serde(skip_serializing))]
     upper: S,
 }
 
-/// What a file holds of [`Deadzones`].
+/// The part of [`Deadzones`] that is saved in files.
 #[cfg(feature = "identify")]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(serde::Deserialize)]
 struct Parameters<S> {
     thresholds: S,
     weights: S,
@@ -100,13 +100,6 @@ impl<S: Storage> TryFrom<Parameters<S>> for Deadzones<S> {
     type Error = OperatorError;
     fn try_from(read: Parameters<S>) -> Result<Self, OperatorError> {
         Self::new(read.thresholds, read.weights, read.reading)
-    }
-}
-
-#[cfg(feature = "identify")]
-impl<S> From<Deadzones<S>> for Parameters<S> {
-    fn from(zones: Deadzones<S>) -> Self {
-        Self { thresholds: zones.thresholds, weights: zones.weights, reading: zones.reading }
     }
 }
 
@@ -122,7 +115,7 @@ impl<S: Storage> Deadzones<S> {
     /// An envelope of deadzones with thresholds eta_j and weights g_j of any sign.
     ///
     /// # Errors
-    /// Arrays of different length, elements that are not finite.
+    /// The arrays differ in length, or an element is not finite.
     pub fn new(thresholds: S, weights: S, reading: Reading) -> Result<Self, OperatorError> {
         require_length("weights", weights.values().len(), thresholds.values().len())?;
         require_finite("thresholds", thresholds.values())?;
@@ -144,17 +137,17 @@ impl<S: Storage> Deadzones<S> {
         self.thresholds.values()
     }
 
-    /// The weights g_j.
+    /// The weights g_j, in units of z per unit of u.
     pub fn weights(&self) -> &[S::Item] {
         self.weights.values()
     }
 
-    /// How the deadzones are read.
+    /// The deadzone convention.
     pub fn reading(&self) -> Reading {
         self.reading
     }
 
-    /// Z_eta of one sample, without its weight; `previous` is u(k-1).
+    /// Z_eta for one sample, without its weight; `previous` is u(k-1).
     #[inline]
     pub fn zone(&self, threshold: S::Item, previous: S::Item, input: S::Item) -> S::Item {
         self.reading.zone(threshold, previous, input)
@@ -188,22 +181,8 @@ impl<S: Storage> Operator for Deadzones<S> {
         }
     }
 
-    fn block(
-        &self,
-        state: &mut DeadzonesState<S::Item>,
-        input: &[S::Item],
-        output: &mut [S::Item],
-    ) -> usize {
-        for (output, input) in output.chunks_mut(IN_CACHE).zip(input.chunks(IN_CACHE)) {
-            let samples = input.len().min(output.len());
-            output[..samples].copy_from_slice(&input[..samples]);
-            self.in_place(state, &mut output[..samples]);
-        }
-        input.len().min(output.len())
-    }
-
-    /// On a host all deadzones are one piecewise linear curve to a long record, whose cost hardly grows with their
-    /// number. The same as [`Operator::step`] up to rounding.
+    /// On a host, a long record is evaluated with one piecewise linear curve for all deadzones, at a cost that hardly
+    /// grows with their number. The outputs equal those of [`Operator::step`] up to rounding.
     fn in_place(&self, state: &mut DeadzonesState<S::Item>, signal: &mut [S::Item]) {
         #[cfg(feature = "identify")]
         {

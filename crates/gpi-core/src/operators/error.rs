@@ -1,18 +1,18 @@
-//! Why an operator cannot be built or started.
+//! Errors of the operators' constructors and states.
 
 use core::fmt;
 
-/// A parameter or state that an operator refuses; `parameter` is its name in the constructor.
+/// A parameter or a state that an operator rejects; `parameter` is its name in the constructor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum OperatorError {
     /// Two arrays that belong together differ in length.
     LengthMismatch {
-        /// Name of the array whose length is wrong.
+        /// Name of the array with the wrong length.
         parameter: &'static str,
         /// Its length.
         length: usize,
-        /// The length it must have.
+        /// The required length.
         expected: usize,
     },
     /// An element is NaN or infinite.
@@ -22,38 +22,38 @@ pub enum OperatorError {
         /// Position of the element, from 0.
         index: usize,
     },
-    /// A half-width is negative.
+    /// An element is negative, but must not be.
     Negative {
         /// Name of the array.
         parameter: &'static str,
         /// Position of the element, from 0.
         index: usize,
     },
-    /// Without an inverse: the output does not rise where the input does.
+    /// The operator has no inverse: its output does not increase with its input.
     NotRising {
-        /// Name of the array whose weights do not suffice.
+        /// Name of the array of weights.
         parameter: &'static str,
-        /// Position of the last half-width or threshold that counts there, from 0.
+        /// Position of the last half-width or threshold that contributes to the slope, from 0.
         index: usize,
-        /// Output over input there.
+        /// The slope: change of the output per change of the input.
         slope: f64,
     },
-    /// Without an inverse: the directional deadzone gives the same output for many inputs.
+    /// The operator has no inverse: the directional deadzone maps many inputs to the same output.
     Directional,
-    /// Limits between which nothing can be driven.
+    /// Limits that leave no interval for the drive.
     Limits {
-        /// The lower one.
+        /// The lower limit.
         lower: f64,
-        /// The upper one.
+        /// The upper limit.
         upper: f64,
     },
-    /// Plays further apart than their half-widths let any input bring them.
+    /// A state that no input leads to: two plays differ by more than their half-widths do.
     OutOfPlace {
-        /// Position of the play, from 0, in the order of half-widths.
+        /// Position of the play in ascending order of half-widths, from 0.
         index: usize,
-        /// How far it is from the next narrower play.
+        /// Absolute difference between its output and that of the next narrower play.
         distance: f64,
-        /// By how much its half-width is larger.
+        /// Difference of the two half-widths, the largest possible value of `distance`.
         most: f64,
     },
 }
@@ -72,21 +72,22 @@ impl fmt::Display for OperatorError {
             }
             Self::NotRising { parameter, index, slope } => write!(
                 f,
-                "`{parameter}` up to number {index} sum to a slope of {slope:e}; an inverse needs a positive \
-                 one, so fit with weights that are not negative and with an element at zero"
+                "`{parameter}`: the elements up to index {index} sum to a slope of {slope:e}, but an inverse needs \
+                 a positive slope; fit with non-negative weights and with an element at zero"
             ),
             Self::Directional => f.write_str(
-                "`reading` = directional gives one output for many inputs; only one-sided deadzones have an inverse",
+                "the deadzone convention `reading` = directional maps many inputs to the same output; only one-sided \
+                 deadzones have an inverse",
             ),
             Self::Limits { lower, upper } => write!(
                 f,
-                "`limits` = {lower}, {upper}: the lower one must be below the upper one, and the envelope must \
-                 rise somewhere between them"
+                "`limits` = {lower}, {upper}: the lower limit must be below the upper limit, and the envelope must \
+                 increase somewhere between them"
             ),
             Self::OutOfPlace { index, distance, most } => write!(
                 f,
-                "play {index} stands {distance} from the next narrower one, but no input brings them further \
-                 apart than {most}; give the state that the operator returned"
+                "the output of play {index} differs by {distance} from that of the next narrower play, but no input \
+                 leads to a difference above {most}; pass the state that the operator returned"
             ),
         }
     }
@@ -94,7 +95,7 @@ impl fmt::Display for OperatorError {
 
 impl core::error::Error for OperatorError {}
 
-/// Refuses an array with a NaN or an infinity.
+/// Rejects an array with a NaN or an infinity.
 pub(super) fn require_finite<T: super::Sample>(
     parameter: &'static str,
     values: &[T],
@@ -105,7 +106,18 @@ pub(super) fn require_finite<T: super::Sample>(
     }
 }
 
-/// Refuses an array that is longer or shorter than its partner.
+/// Rejects an array with a negative element.
+pub(super) fn require_not_negative<T: super::Sample>(
+    parameter: &'static str,
+    values: &[T],
+) -> Result<(), OperatorError> {
+    match values.iter().position(|&value| value < T::ZERO) {
+        Some(index) => Err(OperatorError::Negative { parameter, index }),
+        None => Ok(()),
+    }
+}
+
+/// Rejects an array of another length than `expected`.
 pub(super) fn require_length(
     parameter: &'static str,
     length: usize,

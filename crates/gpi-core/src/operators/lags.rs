@@ -1,14 +1,15 @@
-//! First-order lags side by side: the memory of creep.
+//! First-order lags in parallel, the model of creep.
 
-use super::error::{require_finite, require_length};
+use super::error::{require_finite, require_length, require_not_negative};
 use super::storage::sum;
 use super::{Operator, OperatorError, Sample, Storage};
 
-/// What lags of unit DC gain add to the signal that drives them:
+/// A weighted sum of first-order lags in parallel, each of unit DC gain:
 /// `y(k) = sum_i c_i l_i(k)`, `l_i(k+1) = l_i(k) + (1 - a_i) (v(k) - l_i(k))`.
 ///
-/// `a_i = exp(-T / T_i)` is the pole of a time constant T_i at the sampling interval T. A slow lag moves by less than
-/// the last digit of a number in single precision; the state therefore carries on what rounding took.
+/// `a_i = exp(-T / T_i)` is the pole of the time constant T_i at the sampling interval T. In single precision, the
+/// increment of a slow lag is smaller than the rounding error of its value. The state therefore also holds the rounding
+/// error, which is added to the next increment (compensated summation).
 ///
 /// ```
 /// use gpi_core::operators::{Lags, Operator};
@@ -23,46 +24,44 @@ pub struct Lags<S> {
     gains: S,
 }
 
-/// What [`Lags`] remember.
+/// The state of [`Lags`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LagsState<S> {
     /// l_i, in the unit of v.
     pub lags: S,
-    /// What rounding has taken from them.
+    /// The rounding error of each lag, in the unit of v.
     pub carried: S,
 }
 
 impl<S: Storage> Lags<S> {
-    /// Lags that move by `rates` `1 - a_i` of their distance a sample, with gains c_i.
+    /// Lags with `rates` `1 - a_i` per sample and gains c_i, in units of y per unit of v.
     ///
     /// # Errors
-    /// Arrays of different length, elements that are not finite, negative rates.
+    /// The arrays differ in length, an element is not finite, or a rate is negative.
     pub fn new(rates: S, gains: S) -> Result<Self, OperatorError> {
         require_length("gains", gains.values().len(), rates.values().len())?;
         require_finite("rates", rates.values())?;
         require_finite("gains", gains.values())?;
-        match rates.values().iter().position(|&rate| rate < S::Item::ZERO) {
-            Some(index) => Err(OperatorError::Negative { parameter: "rates", index }),
-            None => Ok(Self { rates, gains }),
-        }
+        require_not_negative("rates", rates.values())?;
+        Ok(Self { rates, gains })
     }
 
-    /// `1 - a_i`.
+    /// The rates `1 - a_i`, per sample.
     pub fn rates(&self) -> &[S::Item] {
         self.rates.values()
     }
 
-    /// c_i.
+    /// The gains c_i.
     pub fn gains(&self) -> &[S::Item] {
         self.gains.values()
     }
 
-    /// Where a constant v has brought them.
+    /// The steady state for a constant v: every lag equals v.
     pub fn settled(&self, v: S::Item) -> LagsState<S> {
         LagsState { lags: self.rates.filled(v), carried: self.rates.filled(S::Item::ZERO) }
     }
 
-    /// y of the present sample, which does not depend on v of the same sample.
+    /// y(k), which does not depend on v(k).
     #[inline]
     pub fn output(&self, state: &LagsState<S>) -> S::Item {
         let gains = self.gains.values();
@@ -70,7 +69,7 @@ impl<S: Storage> Lags<S> {
         sum(gains.len(), |i| gains[i] * lags[i])
     }
 
-    /// Moves on by a sample.
+    /// Updates the state with v(k).
     #[inline]
     pub fn advance(&self, state: &mut LagsState<S>, v: S::Item) {
         let places = state.lags.values_mut().iter_mut().zip(state.carried.values_mut());

@@ -1,9 +1,8 @@
-//! Operators, in the order the signal meets them: deadzones, plays, their cascade, lags and linear dynamics; and the way
-//! back from a reference to the drive.
+//! Operators in the order of the signal flow: deadzones, plays, their cascade, first-order lags and linear dynamics;
+//! then the inverse operators, which compute the drive for a reference.
 //!
-//! Configuration (half-widths, thresholds, weights) and state are kept apart: one configuration may
-//! drive any number of channels. Every operator is a [`Operator::step`] first; the block forms run
-//! the same arithmetic over a whole record.
+//! Configuration (half-widths, thresholds, weights) and state are separate: one configuration may serve any number of
+//! channels. [`Operator::step`] defines an operator. The block forms compute the same outputs for a whole record.
 
 #[cfg(feature = "identify")]
 mod block;
@@ -25,11 +24,11 @@ pub use plays::{PlayBank, PlayBankState, play};
 pub use state_space::StateSpaceStep;
 pub use storage::{Sample, Storage};
 
-/// Samples that go through one operator after the other at once: `f64` in and out stay in the processor's second
-/// cache. An eighth of them is no power of two, whose multiples would all go to one place of the first cache.
+/// Block length, in samples, of a cascade of operators: the block's inputs and outputs (`f64`) fit into the second-level
+/// cache. An eighth of it is not a power of two, because addresses at multiples of one share a set of the first cache.
 pub(crate) const IN_CACHE: usize = 32_704;
 
-/// A causal map from one sample to one sample, with its memory held by the caller.
+/// A causal map from one input sample to one output sample. The caller holds its state.
 ///
 /// ```
 /// use gpi_core::operators::{Operator, PlayBank};
@@ -42,31 +41,33 @@ pub(crate) const IN_CACHE: usize = 32_704;
 pub trait Operator {
     /// The number type of the signal, `f32` or `f64`.
     type Sample: Copy;
-    /// What the operator remembers between samples.
+    /// The memory of the operator between samples.
     type State: Clone;
 
-    /// The state before the first sample of an actuator that was never driven.
+    /// The initial state of an actuator that has never been driven.
     fn rest(&self) -> Self::State;
 
-    /// The output of one sample; `state` moves on to the next.
+    /// The output for one sample; updates `state` for the next one.
     fn step(&self, state: &mut Self::State, input: Self::Sample) -> Self::Sample;
 
-    /// The outputs of consecutive samples, written to `output`.
+    /// Writes the outputs for consecutive samples to `output`; updates `state`.
     ///
-    /// Returns how many samples were processed, the length of the shorter slice.
+    /// Returns the number of processed samples, the length of the shorter slice.
     fn block(
         &self,
         state: &mut Self::State,
         input: &[Self::Sample],
         output: &mut [Self::Sample],
     ) -> usize {
-        for (value, &sample) in output.iter_mut().zip(input) {
-            *value = self.step(state, sample);
+        for (output, input) in output.chunks_mut(IN_CACHE).zip(input.chunks(IN_CACHE)) {
+            let samples = input.len().min(output.len());
+            output[..samples].copy_from_slice(&input[..samples]);
+            self.in_place(state, &mut output[..samples]);
         }
         input.len().min(output.len())
     }
 
-    /// Replaces each sample of `signal` by the operator's output.
+    /// Replaces each sample of `signal` by the operator's output; updates `state`.
     fn in_place(&self, state: &mut Self::State, signal: &mut [Self::Sample]) {
         for value in signal {
             *value = self.step(state, *value);

@@ -1,20 +1,19 @@
 //! The play operator F and the weighted bank P of plays.
 
-use super::error::{require_finite, require_length};
+use super::error::{require_finite, require_length, require_not_negative};
 use super::storage::sum;
 use super::{Operator, OperatorError, Sample, Storage};
 
-/// One step of the play operator, equation (7) of the paper:
-/// `F(k) = max(z(k) - r, min(z(k) + r, F(k-1)))`.
+/// One step of the play operator, equation (7) of the paper: `F(k) = max(z(k) - r, min(z(k) + r, F(k-1)))`.
 ///
-/// `half_width` is r, half the width of the gap in which the output sticks; `input` is z(k),
-/// `previous` is F(k-1), all in the same unit. A NaN input leaves the play where it is.
+/// `half_width` is r, half the width of the gap in which the output does not change; `input` is z(k) and `previous` is
+/// F(k-1), all in the same unit. A NaN input leaves the output unchanged.
 ///
 /// ```
 /// use gpi_core::operators::play;
-/// assert_eq!(play(0.3, 1.0, 0.0), 0.7); // pushed up: slides at z - r
-/// assert_eq!(play(0.3, 0.5, 0.7), 0.7); // inside the gap: sticks
-/// assert_eq!(play(0.3, 0.0, 0.7), 0.3); // pushed down: slides at z + r
+/// assert_eq!(play(0.3, 1.0, 0.0), 0.7); // upper branch: z - r
+/// assert_eq!(play(0.3, 0.5, 0.7), 0.7); // inside the gap: unchanged
+/// assert_eq!(play(0.3, 0.0, 0.7), 0.3); // lower branch: z + r
 /// ```
 #[inline]
 pub fn play<T: Sample>(half_width: T, input: T, previous: T) -> T {
@@ -53,15 +52,13 @@ impl<S: Storage> PlayBank<S> {
     /// A bank of plays with half-widths r_i >= 0 and weights p_i of any sign.
     ///
     /// # Errors
-    /// Arrays of different length, elements that are not finite, negative half-widths.
+    /// The arrays differ in length, an element is not finite, or a half-width is negative.
     pub fn new(half_widths: S, weights: S) -> Result<Self, OperatorError> {
         require_length("weights", weights.values().len(), half_widths.values().len())?;
         require_finite("half_widths", half_widths.values())?;
         require_finite("weights", weights.values())?;
-        match half_widths.values().iter().position(|&r| r < S::Item::ZERO) {
-            Some(index) => Err(OperatorError::Negative { parameter: "half_widths", index }),
-            None => Ok(Self { half_widths, weights }),
-        }
+        require_not_negative("half_widths", half_widths.values())?;
+        Ok(Self { half_widths, weights })
     }
 
     /// The half-widths r_i, in the input's unit.
@@ -74,16 +71,15 @@ impl<S: Storage> PlayBank<S> {
         self.weights.values()
     }
 
-    /// The state in which every play's output equals `input`: no hysteresis is left over from the
-    /// past, as after a decaying oscillation around `input`.
+    /// The demagnetized state: every play's output equals `input`, as after a decaying oscillation around `input`.
     pub fn settled(&self, input: S::Item) -> PlayBankState<S> {
         PlayBankState { plays: self.half_widths.filled(input) }
     }
 
-    /// A state from saved play outputs, each clamped by the next sample as (7) does.
+    /// A state from saved play outputs F_{r_i}(k-1), in the bank's order; the next sample clamps each as in (7).
     ///
     /// # Errors
-    /// Another length than the bank's, elements that are not finite.
+    /// The length differs from the bank's, or an element is not finite.
     pub fn state_from(&self, plays: S) -> Result<PlayBankState<S>, OperatorError> {
         require_length("state", plays.values().len(), self.half_widths.values().len())?;
         require_finite("state", plays.values())?;
@@ -93,10 +89,10 @@ impl<S: Storage> PlayBank<S> {
 
 #[cfg(feature = "identify")]
 impl PlayBank<Vec<f64>> {
-    /// [`Operator::block`] on several threads, each a stretch of time: it pays from about a million samples on.
+    /// [`Operator::block`] on several threads, each with one segment of the record: faster from about 10^6 samples on.
     ///
-    /// Where z does not sweep twice the largest half-width within a stretch, one thread does all. The same as
-    /// [`Operator::block`] up to rounding.
+    /// If z varies by less than twice the largest half-width within a segment, one thread computes everything. The
+    /// outputs equal those of [`Operator::block`] up to rounding.
     ///
     /// ```
     /// use gpi_core::operators::{Operator, PlayBank};
@@ -124,7 +120,7 @@ impl PlayBank<Vec<f64>> {
 }
 
 impl<S: Storage> PlayBankState<S> {
-    /// The play outputs, for saving.
+    /// The play outputs F_{r_i}(k-1), to be saved.
     pub fn plays(&self) -> &[S::Item] {
         self.plays.values()
     }
@@ -134,7 +130,7 @@ impl<S: Storage> Operator for PlayBank<S> {
     type Sample = S::Item;
     type State = PlayBankState<S>;
 
-    /// All plays at zero; the first sample then gives F(0) = clamp(0, z(0) - r, z(0) + r).
+    /// All play outputs are zero; the first sample then gives F(0) = clamp(0, z(0) - r, z(0) + r).
     fn rest(&self) -> PlayBankState<S> {
         PlayBankState { plays: self.half_widths.filled(S::Item::ZERO) }
     }
@@ -166,8 +162,8 @@ impl<S: Storage> Operator for PlayBank<S> {
         samples
     }
 
-    /// On a host a long record takes the fastest way there is: by turning points where z goes on, over several
-    /// stretches of time side by side where it turns all the time. The same as [`Operator::step`] up to rounding.
+    /// On a host, a long record is computed from the turning points of z, or, if z reverses often, in several segments
+    /// of time in parallel. The outputs equal those of [`Operator::step`] up to rounding.
     fn in_place(&self, state: &mut PlayBankState<S>, signal: &mut [S::Item]) {
         if !self.at_length(state, None, signal) {
             for value in signal {
@@ -178,38 +174,27 @@ impl<S: Storage> Operator for PlayBank<S> {
 }
 
 impl<S: Storage> PlayBank<S> {
-    /// The outputs of a long record on a host, of `input` or in place; `false`, and nothing done, of others.
-    #[cfg(feature = "identify")]
+    /// The outputs for a long record on a host, from `input` or in place; otherwise does nothing and returns `false`.
+    #[cfg_attr(not(feature = "identify"), expect(unused_variables, clippy::unused_self))]
     fn at_length(
         &self,
         state: &mut PlayBankState<S>,
         input: Option<&[S::Item]>,
         signal: &mut [S::Item],
     ) -> bool {
-        use super::block::bank;
-        let (widths, weights) = (self.half_widths.values(), self.weights.values());
-        if !bank::pays(widths.len(), signal.len()) {
-            return false;
+        #[cfg(feature = "identify")]
+        if super::block::bank::pays(self.half_widths.values().len(), signal.len())
+            && let (Some(widths), Some(weights), Some(places), Some(signal)) = (
+                S::Item::doubles(self.half_widths.values()),
+                S::Item::doubles(self.weights.values()),
+                S::Item::doubles_mut(state.plays.values_mut()),
+                S::Item::doubles_mut(signal),
+            )
+        {
+            let input = input.and_then(S::Item::doubles);
+            super::block::bank::run((widths, weights), places, input, signal);
+            return true;
         }
-        let (Some(widths), Some(weights), Some(places), Some(signal)) = (
-            S::Item::doubles(widths),
-            S::Item::doubles(weights),
-            S::Item::doubles_mut(state.plays.values_mut()),
-            S::Item::doubles_mut(signal),
-        ) else {
-            return false;
-        };
-        bank::run((widths, weights), places, input.and_then(S::Item::doubles), signal);
-        true
-    }
-
-    #[cfg(not(feature = "identify"))]
-    fn at_length(
-        &self,
-        _: &mut PlayBankState<S>,
-        _: Option<&[S::Item]>,
-        _: &mut [S::Item],
-    ) -> bool {
         false
     }
 }

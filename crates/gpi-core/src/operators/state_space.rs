@@ -1,11 +1,11 @@
-//! Linear dynamics of a size that is known when they are compiled.
+//! Linear dynamics whose dimensions are known at compile time.
 
 use super::error::require_finite;
 use super::{OperatorError, Sample};
 
 /// `x(k+1) = A x(k) + B v(k)`, `y(k) = C x(k) + D v(k)`, with N states, M inputs and P outputs.
 ///
-/// For firmware; on a host `linear::StateSpace` has its sizes at run time.
+/// Intended for firmware. On a host, the dimensions of `linear::StateSpace` are known at run time.
 ///
 /// ```
 /// use gpi_core::operators::StateSpaceStep;
@@ -23,10 +23,10 @@ pub struct StateSpaceStep<T, const N: usize, const M: usize, const P: usize> {
 }
 
 impl<T: Sample, const N: usize, const M: usize, const P: usize> StateSpaceStep<T, N, M, P> {
-    /// Matrices by rows.
+    /// A model from its matrices, each an array of rows: A (N x N), B (N x M), C (P x N), D (P x M).
     ///
     /// # Errors
-    /// Elements that are not finite.
+    /// An element is not finite.
     pub fn new(
         a: [[T; N]; N],
         b: [[T; M]; N],
@@ -40,7 +40,7 @@ impl<T: Sample, const N: usize, const M: usize, const P: usize> StateSpaceStep<T
         Ok(Self { a, b, c, d })
     }
 
-    /// y of one sample; the state x moves on to the next.
+    /// y(k) for v(k); `state` changes from x(k) to x(k+1).
     #[inline]
     pub fn step(&self, state: &mut [T; N], v: &[T; M]) -> [T; P] {
         let rows = |x: &[[T; N]], u: &[[T; M]], into: &mut [T]| {
@@ -56,7 +56,7 @@ impl<T: Sample, const N: usize, const M: usize, const P: usize> StateSpaceStep<T
     }
 }
 
-/// `left . right`.
+/// The dot product.
 #[inline]
 fn product<T: Sample, const K: usize>(left: &[T; K], right: &[T; K]) -> T {
     let mut sum = T::ZERO;

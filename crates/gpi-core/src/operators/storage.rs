@@ -1,4 +1,4 @@
-//! Number types and the arrays that hold parameters and states.
+//! Number types, and the arrays that hold parameters and states.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -20,25 +20,25 @@ pub trait Sample:
     const ONE: Self;
     /// Positive infinity.
     const INFINITY: Self;
-    /// The distance from one to the next larger number.
+    /// The difference between 1 and the next larger number.
     const EPSILON: Self;
-    /// Neither NaN nor infinite.
+    /// Whether the value is neither NaN nor infinite.
     fn finite(self) -> bool;
-    /// The smaller one; `self` where either is NaN.
+    /// The smaller of two values; `self` if either is NaN.
     #[inline]
     fn at_most(self, limit: Self) -> Self {
         if limit < self { limit } else { self }
     }
-    /// The larger one; `self` where either is NaN.
+    /// The larger of two values; `self` if either is NaN.
     #[inline]
     fn at_least(self, limit: Self) -> Self {
         if limit > self { limit } else { self }
     }
-    /// The values, where they are `f64`.
+    /// The values if the type is `f64`: selects the block kernels of the host.
     fn doubles(_: &[Self]) -> Option<&[f64]> {
         None
     }
-    /// The values, to be changed, where they are `f64`.
+    /// The mutable values if the type is `f64`.
     fn doubles_mut(_: &mut [Self]) -> Option<&mut [f64]> {
         None
     }
@@ -70,7 +70,7 @@ impl_sample! {
     }
 }
 
-/// Terms that are summed side by side: sums that wait for each other are what a sample's time goes into.
+/// Number of independent partial sums: one sum alone would wait for the latency of each addition.
 const SIDE_BY_SIDE: usize = 4;
 
 /// The sum of `term(i)` over `0..count`.
@@ -92,25 +92,41 @@ pub(super) fn sum<T: Sample>(count: usize, mut term: impl FnMut(usize) -> T) -> 
 }
 
 /// An array of samples: `[T; N]` on firmware (no heap), `Vec<T>` on a host.
-pub trait Storage: Clone {
+pub trait Storage:
+    Clone + AsRef<[<Self as Storage>::Item]> + AsMut<[<Self as Storage>::Item]>
+{
     /// The number type.
     type Item: Sample;
     /// The values.
-    fn values(&self) -> &[Self::Item];
-    /// The values, to be changed.
-    fn values_mut(&mut self) -> &mut [Self::Item];
+    #[inline]
+    fn values(&self) -> &[Self::Item] {
+        self.as_ref()
+    }
+    /// The values, mutable.
+    #[inline]
+    fn values_mut(&mut self) -> &mut [Self::Item] {
+        self.as_mut()
+    }
     /// An array of the same length in which every element is `value`.
     fn filled(&self, value: Self::Item) -> Self;
 }
 
+/// Sorts `keys` in ascending order, and the arrays of `others` along with it (insertion sort, which is stable and needs
+/// no heap).
+pub(super) fn sort_by_key<S: Storage, const K: usize>(keys: &mut S, mut others: [&mut S; K]) {
+    let keys = keys.values_mut();
+    for next in 1..keys.len() {
+        let mut place = next;
+        while place > 0 && keys[place - 1] > keys[place] {
+            keys.swap(place - 1, place);
+            others.iter_mut().for_each(|other| other.values_mut().swap(place - 1, place));
+            place -= 1;
+        }
+    }
+}
+
 impl<T: Sample, const N: usize> Storage for [T; N] {
     type Item = T;
-    fn values(&self) -> &[T] {
-        self
-    }
-    fn values_mut(&mut self) -> &mut [T] {
-        self
-    }
     fn filled(&self, value: T) -> Self {
         [value; N]
     }
@@ -119,12 +135,6 @@ impl<T: Sample, const N: usize> Storage for [T; N] {
 #[cfg(any(feature = "identify", test))]
 impl<T: Sample> Storage for Vec<T> {
     type Item = T;
-    fn values(&self) -> &[T] {
-        self
-    }
-    fn values_mut(&mut self) -> &mut [T] {
-        self
-    }
     fn filled(&self, value: T) -> Self {
         vec![value; self.len()]
     }

@@ -1,4 +1,4 @@
-//! The fastest way through a long record: chosen by how z moves and how many plays there are.
+//! The fastest method for a long record, selected by the number of plays and by how often z reverses.
 
 use super::lanes;
 use super::ranked::Ranked;
@@ -6,9 +6,21 @@ use super::turning_points::TurningPoints;
 use crate::operators::IN_CACHE;
 use pulp::Simd;
 
-/// Outputs of a bank of plays, long ones, of `input` or in place of their inputs; `places` move on.
+/// Fewest samples for which sorting the bank takes less time than it saves.
+const FEWEST: usize = 256;
+
+/// The turning-point method is used for more plays than this per SIMD lane even if z reverses often.
+const FEW_A_LANE: usize = 32;
+
+/// Samples at the start of a block from which the rate of reversals is estimated.
+const PROBE: usize = 128;
+
+/// A signal reverses often if it has more than one reversal per this number of samples, as noise has.
+const OFTEN: usize = 8;
+
+/// The outputs of a bank of plays for a long record, from `input` or in place; updates `places`, the plays' outputs.
 ///
-/// The same as sample by sample up to rounding. What is not finite goes that way.
+/// The outputs equal those of the definition up to rounding. Blocks with values that are not finite use the definition.
 pub(crate) fn run(
     (half_widths, weights): (&[f64], &[f64]),
     places: &mut [f64],
@@ -18,9 +30,8 @@ pub(crate) fn run(
     pulp::Arch::new().dispatch(Bank { half_widths, weights, places, input, signal });
 }
 
-/// Whether a signal is long enough for it to pay that the bank is put in order first.
+/// Whether a signal is long enough for [`run`] to be the faster choice.
 pub(crate) fn pays(plays: usize, samples: usize) -> bool {
-    const FEWEST: usize = 256;
     plays > 1 && samples >= FEWEST.max(4 * plays)
 }
 
@@ -78,24 +89,17 @@ impl pulp::WithSimd for Bank<'_> {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Way {
-    /// By turning points.
+    /// From the turning points.
     Turns,
-    /// Stretches of time side by side.
+    /// Segments of time in parallel.
     Lanes,
-    /// Play by play.
+    /// By the definition, one play after the other.
     OneByOne,
 }
 
-/// Plays for each number that a vector holds up to which noise is followed one by one.
-const FEW_A_LANE: usize = 32;
-
-/// Where z often turns, few plays are followed faster one by one than by their turning points.
+/// The method for a block: if z reverses often, few plays are computed faster one by one than from turning points.
 fn way(input: &[f64], are_few: bool) -> Way {
-    /// Of a block that tell how it goes on.
-    const PROBE: usize = 128;
-    /// Samples for each reversal of noise.
-    const OFTEN: usize = 8;
-    // counted, since to stop at the first one takes longer than to look at all
+    // a count vectorizes, a search for the first one does not
     if input.iter().filter(|z| !z.is_finite()).count() > 0 {
         return Way::OneByOne;
     }

@@ -1,25 +1,25 @@
-//! A piecewise linear function of one number, at a cost that does not grow with its pieces.
+//! A piecewise linear function, evaluated at a cost that does not grow with the number of its pieces.
 
 use super::knots::Knots;
 
-/// `a_c x + b_c`, c the number of knots at most x.
+/// `a_c x + b_c`, where c is the number of knots at or below x.
 pub(super) struct Curve {
     knots: Knots,
     lines: Vec<(f64, f64)>,
-    /// One a bucket of the knots: all that a number which falls into it needs.
+    /// One for each bucket of the knots.
     cells: Vec<Cell>,
 }
 
-/// The lines before and behind the knot of a bucket.
+/// The lines below and above the knot of a bucket.
 #[derive(Clone, Copy)]
 struct Cell {
-    /// NaN where there are several.
+    /// NaN if the bucket has several knots.
     knot: f64,
     lines: [(f64, f64); 2],
 }
 
 impl Curve {
-    /// Of sorted finite knots; a line more than knots.
+    /// The function with these finite knots, in ascending order, and one line more than knots.
     pub(super) fn new(knots: Vec<f64>, lines: Vec<(f64, f64)>) -> Self {
         let knots = Knots::new(knots);
         let cell = |(knot, before, count): (f64, usize, usize)| Cell {
@@ -30,7 +30,7 @@ impl Curve {
         Self { knots, lines, cells }
     }
 
-    /// How many knots are at most x.
+    /// The number of knots at or below x.
     #[inline(always)]
     pub(super) fn at_most(&self, x: f64) -> usize {
         self.knots.at_most(x)
@@ -43,7 +43,7 @@ impl Curve {
         let (slope, constant) = if knot.is_nan() {
             self.lines[self.knots.at_most(x)]
         } else {
-            // an index, which is no branch to be guessed
+            // an index instead of a branch, which the processor would have to predict
             lines[usize::from(*knot <= x)]
         };
         slope * x + constant

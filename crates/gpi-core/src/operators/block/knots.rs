@@ -1,6 +1,12 @@
-//! Where a number stands among sorted ones, at a cost that does not grow with how many there are.
+//! The rank of a number among sorted numbers, at a cost that does not grow with their count.
 
-/// Sorted numbers in buckets.
+/// Buckets for each number: most buckets then hold at most one.
+const SPARSE: usize = 4;
+
+/// 2^52: adding it to a number between 0 and 2^31 leaves the nearest integer in the last digits of the sum.
+const INTEGER: f64 = 4_503_599_627_370_496.0;
+
+/// Sorted numbers, divided among buckets of equal width.
 pub(super) struct Knots {
     values: Vec<f64>,
     buckets: Vec<Bucket>,
@@ -10,21 +16,19 @@ pub(super) struct Knots {
     last: f64,
 }
 
-/// The numbers of a part of their range.
+/// The numbers in one part of the range.
 #[derive(Clone, Copy)]
 struct Bucket {
-    /// Infinite where it holds none.
+    /// Infinite if the bucket is empty.
     first: f64,
-    /// How many are in earlier buckets.
+    /// The count of numbers in earlier buckets.
     before: u32,
     count: u32,
 }
 
 impl Knots {
-    /// Of sorted finite numbers.
+    /// The buckets of finite numbers in ascending order.
     pub(super) fn new(values: Vec<f64>) -> Self {
-        /// Buckets for each number: most hold one at most.
-        const SPARSE: usize = 4;
         let (lowest, highest) = match &values[..] {
             [lowest, .., highest] => (*lowest, *highest),
             _ => (0.0, 0.0),
@@ -49,24 +53,22 @@ impl Knots {
         knots
     }
 
-    /// Its number in each bucket, or infinity; how many are in earlier buckets; how many there are.
+    /// For each bucket: its smallest number or infinity, the count in earlier buckets, and its own count.
     pub(super) fn buckets(&self) -> impl Iterator<Item = (f64, usize, usize)> {
         let parts = |bucket: &Bucket| (bucket.first, bucket.before as usize, bucket.count as usize);
         self.buckets.iter().map(parts)
     }
 
-    /// Where a number that is no NaN falls. It keeps the order of numbers: all in an earlier bucket are smaller.
+    /// The bucket of a number that is not NaN. All numbers in earlier buckets are smaller.
     #[inline(always)]
     pub(super) fn bucket(&self, x: f64) -> usize {
-        /// To this a number below 2^31 adds up to its nearest integer in the last digits.
-        const INTEGER: f64 = 4_503_599_627_370_496.0;
         let place = (x - self.lowest) * self.scale;
         let place = if place > 0.0 { place } else { 0.0 };
         let place = if place < self.last { place } else { self.last };
         (place + INTEGER).to_bits() as u32 as usize
     }
 
-    /// How many are at most x.
+    /// The count of numbers at or below x.
     #[inline(always)]
     pub(super) fn at_most(&self, x: f64) -> usize {
         let Bucket { first, before, count } = self.buckets[self.bucket(x)];

@@ -1,18 +1,20 @@
-//! Plays of noise, one after the other, over several stretches of time side by side.
+//! Plays of a signal that reverses often: one play after the other, over several segments of time in parallel.
 
 use super::ranked::Ranked;
 use crate::operators::play;
 use pulp::Simd;
 
-/// Stretches side by side: what the widest vectors of today's processors hold.
+/// Number of parallel segments: the `f64` lanes of the widest vectors of today's processors.
 const LANES: usize = 8;
 type Lanes = [f64; LANES];
-/// Samples of each lane that are brought side by side at once: a vector that is read back as soon as its lanes are
-/// written, or the other way, would wait for them.
+/// Samples of each lane that are interleaved at once. A vector load directly after scalar stores to the same address, or
+/// the reverse, would stall.
 const AT_ONCE: usize = 64;
 
-/// Replaces inputs by the outputs of plays that stand at `places`, which move on; `false`, and nothing done, where some
-/// play does not forget within a stretch how it began.
+/// Replaces inputs by the outputs of the plays and updates `places`, the outputs of each play.
+///
+/// Does nothing and returns `false` if the state of some play at the start of a segment cannot be determined from the
+/// segment before.
 #[inline(always)]
 pub(super) fn run<S: Simd>(
     simd: S,
@@ -49,8 +51,10 @@ pub(super) fn run<S: Simd>(
     true
 }
 
-/// Where plays stand after these samples wherever they stood before: what z was last at the far side of each gap
-/// before it swept all of it holds the play. `None` where it does not sweep the widest gap in the latest `most` samples.
+/// The outputs of the plays after these samples, whatever their initial state: once z has varied by the width 2 r of a
+/// play's gap, its output depends on the last extremum of z only.
+///
+/// `None` if z varies by less than the width of the widest gap within the latest `most` samples.
 pub(super) fn settled(bank: &Ranked, samples: &[f64], most: usize) -> Option<Vec<f64>> {
     let mut places = vec![0.0; bank.len()];
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -75,7 +79,7 @@ pub(super) fn settled(bank: &Ranked, samples: &[f64], most: usize) -> Option<Vec
     None
 }
 
-/// Replaces some samples of each lane by the outputs of all plays.
+/// Replaces a few samples of each lane by the outputs of all plays.
 #[inline(always)]
 fn follow<S: Simd>(
     simd: S,
@@ -98,10 +102,10 @@ fn follow<S: Simd>(
     beside.copy_from_slice(sums);
 }
 
-/// Half-widths, weights and where the plays stand in each lane.
+/// Half-widths, weights, and the outputs of the plays in each lane.
 type Plays<'a> = (&'a [f64], &'a [f64], &'a mut [Lanes]);
 
-/// Adds the outputs of the first plays, which stay in registers meanwhile; returns the others.
+/// Adds the outputs of the first plays, whose state stays in registers; returns the other plays.
 #[inline(always)]
 fn some<'a, S: Simd, const COUNT: usize>(
     simd: S,
@@ -121,7 +125,7 @@ fn some<'a, S: Simd, const COUNT: usize>(
             std::array::from_fn(|i| S::as_simd_f64s(&own[i]).0[part]);
         for (z, sum) in beside.iter().zip(&mut *sums) {
             let (z, sum) = (S::as_simd_f64s(z).0[part], &mut S::as_mut_simd_f64s(sum).0[part]);
-            // two sums, so that one need not wait for the other
+            // two independent sums hide the latency of the additions
             let mut second = simd.splat_f64s(0.0);
             for i in 0..COUNT {
                 let (low, high) = (simd.sub_f64s(z, r[i]), simd.add_f64s(z, r[i]));
@@ -138,7 +142,7 @@ fn some<'a, S: Simd, const COUNT: usize>(
     (half_widths, weights, stand)
 }
 
-/// Each sample by the definition.
+/// The outputs by the definition, sample by sample.
 pub(super) fn one_by_one(
     half_widths: &[f64],
     weights: &[f64],

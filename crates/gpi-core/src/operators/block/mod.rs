@@ -1,4 +1,4 @@
-//! The operators over long records, at a cost that hardly grows with their number of plays or deadzones.
+//! Block kernels for long records, at a cost that hardly grows with the number of plays or deadzones.
 
 pub(super) mod bank;
 mod curve;

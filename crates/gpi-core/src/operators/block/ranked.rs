@@ -1,16 +1,16 @@
-//! The half-widths of a bank in order, with sums over those below.
+//! The half-widths of a bank in ascending order, with cumulative sums.
 
 use super::curve::Curve;
 
-/// Plays by half-width.
+/// Plays in ascending order of half-widths.
 pub(super) struct Ranked {
-    /// Places in the bank, by half-width.
+    /// Index in the bank of each play.
     pub order: Vec<usize>,
-    /// r, in order.
+    /// r, ascending.
     pub half_widths: Vec<f64>,
-    /// Sums of p over the first so many plays.
+    /// Cumulative sums of p, starting with the sum of no play.
     pub weights: Vec<f64>,
-    /// Sums of p r over the first so many plays.
+    /// Cumulative sums of p r, starting with the sum of no play.
     pub moments: Vec<f64>,
     /// `sum_i p_i max(x - r_i, 0)`.
     curve: Curve,
@@ -37,7 +37,7 @@ impl Ranked {
         self.order.len()
     }
 
-    /// How many half-widths are at most x.
+    /// The number of half-widths at or below x.
     #[inline(always)]
     pub(super) fn at_most(&self, x: f64) -> usize {
         self.curve.at_most(x)
@@ -50,7 +50,7 @@ impl Ranked {
     }
 }
 
-/// The sum of no term, of the first one, of the first two, ...
+/// Cumulative sums, starting with the sum of no term.
 pub(super) fn sums(terms: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut sum = 0.0;
     let later = terms.map(|term| {

@@ -1,14 +1,14 @@
-//! A long record of plays on several threads, each a stretch of time.
+//! Plays over a long record on several threads, each with one segment of time.
 
 use super::bank;
 use super::lanes::settled;
 use super::ranked::Ranked;
 use rayon::prelude::*;
 
-/// Outputs of a bank of plays, as [`bank::run`].
+/// The outputs of a bank of plays, as [`bank::run`].
 ///
-/// A stretch can begin before the one before it has ended where z has swept the widest play's gap: from there on all
-/// plays stand where they do wherever they stood before. Where z does not for a whole stretch one thread does all.
+/// The state at the start of each segment follows from the segment before if z varies there by the width of the widest
+/// gap ([`settled`]). If it varies less in some segment, one thread computes everything.
 pub(crate) fn run(
     (half_widths, weights): (&[f64], &[f64]),
     places: &mut [f64],

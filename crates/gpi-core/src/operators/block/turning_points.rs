@@ -1,44 +1,51 @@
-//! A bank of plays by its turning points: a sample costs the same whatever the number of plays.
+//! A bank of plays from the turning points of its input: the cost of a sample does not depend on the number of plays.
 //!
-//! Along a branch that began at a turning point the narrowest plays move, `F_i = z - s r_i` with s = 1 where z rises
-//! and -1 where it falls, and the others stand where earlier branches left them. So
-//! `v = P_c z - s Q_c + R_c`, with P_c and Q_c the sums of p_i and p_i r_i over the c plays that move, and R_c that of
-//! `p_i F_i` over those that stand; c grows as z goes on, and a reversal starts again with none.
+//! Call the samples between two reversals of z a branch, with the sign s = 1 if z increases and s = -1 if it decreases.
+//! Along a branch the c narrowest plays move, `F_i = z - s r_i`, and the others keep the outputs of earlier branches.
+//! Hence `v = P_c z - s Q_c + R_c`, where P_c and Q_c are the sums of p_i and p_i r_i over the c moving plays, and R_c is
+//! the sum of `p_i F_i` over the others. The count c grows along the branch and is zero again after a reversal.
 
 use super::ranked::Ranked;
 use pulp::Simd;
 
-/// Samples that are taken at once where z goes on and no further play starts to move.
+/// Samples that are computed at once if they belong to one branch.
 const RUN: usize = 8;
 
-/// A branch that has ended: where its plays stand that no later branch has moved.
+/// Consecutive samples without a reversal after which a run of [`RUN`] samples is tried.
+const QUIET: usize = 3;
+
+/// Rounding error allowed in a difference of play outputs, relative to the largest number involved: a few hundred times
+/// the precision of `f64`.
+const SLACK: f64 = 1e-13;
+
+/// A branch that has ended and still determines the outputs of some plays.
 struct Turn {
-    /// The plays from the end of the next later branch to here are its own.
+    /// It determines the plays from the next later branch's `end` up to this rank.
     end: usize,
     /// z at its end.
     z: f64,
-    /// 1 where it rose, -1 where it fell.
+    /// 1 if z increased, -1 if it decreased.
     sign: f64,
     /// Sum of `p F` over the plays from `end` on.
     rest: f64,
 }
 
-/// Where all plays stand.
+/// The state of all plays.
 pub(super) struct TurningPoints<'a> {
     bank: &'a Ranked,
-    /// Where the plays stood that no branch has moved yet, by half-width, and sums of `p F` from each on.
+    /// The initial outputs of the plays by half-width, and the sums of `p F` from each rank on.
     places: Vec<f64>,
     rests: Vec<f64>,
-    /// The earliest, which moved the widest plays, comes first.
+    /// The earliest branch, which determines the widest plays, comes first.
     turns: Vec<Turn>,
-    /// Of the present branch.
+    /// Of the current branch.
     sign: f64,
     last: f64,
-    /// How many plays move.
+    /// The number of moving plays.
     moving: usize,
-    /// The `sign * z` from which on more of them move.
+    /// The `sign * z` from which more plays move.
     limit: f64,
-    /// Sum of `p F` over those that stand.
+    /// Sum of `p F` over the other plays.
     rest: f64,
     /// `v = slope z + constant`.
     slope: f64,
@@ -46,16 +53,16 @@ pub(super) struct TurningPoints<'a> {
 }
 
 impl<'a> TurningPoints<'a> {
-    /// Plays that stand at `places` (in the bank's order) before a signal that begins at `first`; `None` where a wider
-    /// play stands so far from a narrower one that the narrower may move after it.
+    /// The plays with outputs `places` (in the bank's order) before a signal whose first sample is `first`.
+    ///
+    /// `None` if the outputs of two neighbours differ by more than their half-widths: then a wider play may move before
+    /// a narrower one.
     pub(super) fn new(
         bank: &'a Ranked,
         weights: &[f64],
         places: &[f64],
         first: f64,
     ) -> Option<Self> {
-        /// Of rounding, relative to all that plays are compared with.
-        const SLACK: f64 = 1e-13;
         let places: Vec<f64> = bank.order.iter().map(|&i| places[i]).collect();
         let widest = bank.half_widths.last().copied().unwrap_or(0.0);
         let size = places.iter().fold(widest + first.abs(), |size, place| size.max(place.abs()));
@@ -69,33 +76,21 @@ impl<'a> TurningPoints<'a> {
         for (rank, &i) in bank.order.iter().enumerate().rev() {
             rests[rank] = rests[rank + 1] + weights[i] * places[rank];
         }
-        // all plays stand: towards `first` is as good a direction as any
+        // no play moves yet: any direction is valid, the one towards `first` avoids a reversal
         let sign = match places.first() {
             Some(narrowest) if first < *narrowest => -1.0,
             _ => 1.0,
         };
-        let turns = Vec::new();
-        let (moving, limit, rest) = (0, f64::INFINITY, 0.0);
-        let (slope, constant) = (0.0, 0.0);
-        let mut found = Self {
-            bank,
-            places,
-            rests,
-            turns,
-            sign,
-            last: first,
-            moving,
-            limit,
-            rest,
-            slope,
-            constant,
-        };
+        let (last, turns, moving, limit) = (first, Vec::new(), 0, f64::INFINITY);
+        let (rest, slope, constant) = (0.0, 0.0, 0.0);
+        let mut found =
+            Self { bank, places, rests, turns, sign, last, moving, limit, rest, slope, constant };
         found.look_ahead();
         found.settle();
         Some(found)
     }
 
-    /// Writes where the plays stand, in the bank's order.
+    /// Writes the outputs of the plays, in the bank's order.
     pub(super) fn write_places(&self, places: &mut [f64]) {
         let mut rank = 0;
         let present = Turn { end: self.moving, z: self.last, sign: self.sign, rest: 0.0 };
@@ -110,7 +105,7 @@ impl<'a> TurningPoints<'a> {
         }
     }
 
-    /// From where on more plays move.
+    /// Sets `limit` for the current branch.
     #[inline(always)]
     fn look_ahead(&mut self) {
         let (half_widths, c) = (&self.bank.half_widths, self.moving);
@@ -122,7 +117,7 @@ impl<'a> TurningPoints<'a> {
         };
     }
 
-    /// How v follows z.
+    /// Sets `rest`, `slope` and `constant` for the plays that move now.
     #[inline(always)]
     fn settle(&mut self) {
         let (Ranked { weights, moments, .. }, c) = (self.bank, self.moving);
@@ -138,7 +133,7 @@ impl<'a> TurningPoints<'a> {
         self.constant = self.rest - self.sign * moments[c];
     }
 
-    /// One sample.
+    /// The output for one sample.
     #[inline(always)]
     fn step(&mut self, z: f64) -> f64 {
         let turned = self.sign * (z - self.last) < 0.0;
@@ -161,7 +156,7 @@ impl<'a> TurningPoints<'a> {
         self.slope * z + self.constant
     }
 
-    /// More plays move: as many of the latest earlier branch as z has come to.
+    /// Adds the plays that move now, at most those of the latest earlier branch.
     #[inline(always)]
     fn go_on(&mut self, z: f64) {
         let (s, next) = (self.sign, self.moving + 1);
@@ -185,7 +180,7 @@ impl<'a> TurningPoints<'a> {
         self.look_ahead();
     }
 
-    /// The `sign * z` from which on more plays move than those of the latest earlier branch.
+    /// The `sign * z` from which more plays move than those of the latest earlier branch.
     #[inline(always)]
     fn farthest(&self) -> f64 {
         match self.turns.last() {
@@ -196,8 +191,8 @@ impl<'a> TurningPoints<'a> {
         }
     }
 
-    /// The outputs of samples that go on over where more and more plays of the latest earlier branch move: with that
-    /// branch's end at z_t and s the sign, `v = v_t + 2 s sum_i p_i max(|z - z_t| / 2 - r_i, 0)`.
+    /// The outputs for samples along which more and more plays of the latest earlier branch move:
+    /// `v = v_t + 2 s sum_i p_i max(|z - z_t| / 2 - r_i, 0)`, where z_t is that branch's end and v_t its output.
     #[inline(always)]
     fn curve(&mut self, now: &[f64; RUN], out: &mut [f64; RUN]) {
         let Some(turn) = self.turns.last() else { return };
@@ -214,11 +209,9 @@ impl<'a> TurningPoints<'a> {
         self.settle();
     }
 
-    /// The outputs of finite samples.
+    /// The outputs for finite samples.
     #[inline(always)]
     pub(super) fn run<S: Simd>(&mut self, simd: S, input: &[f64], output: &mut [f64]) {
-        /// Samples in a row without a reversal after which there may be more of them.
-        const QUIET: usize = 3;
         let mut quiet = 0;
         let mut k = 0;
         while k < input.len() {
@@ -250,7 +243,7 @@ impl<'a> TurningPoints<'a> {
     }
 }
 
-/// Whether each sample goes on from the one before in the direction of `sign`, or stands.
+/// Whether no sample reverses the direction `sign`.
 #[inline(always)]
 fn goes_on<S: Simd>(simd: S, passed: &[f64; RUN], now: &[f64; RUN], sign: f64) -> bool {
     let (passed, now) = (S::as_simd_f64s(passed).0, S::as_simd_f64s(now).0);

@@ -1,14 +1,17 @@
-//! A sum of deadzones as one piecewise linear curve.
+//! A sum of deadzones as one piecewise linear curve, for both deadzone conventions.
 
 use super::curve::Curve;
 use super::ranked::sums;
 use crate::operators::Reading;
 
-/// `sum_j g_j max(x - eta_j, 0)`, less `sum_j h_j max(eta_j - x, 0)`; terms are `(eta, g, h)`.
+/// Fewest samples for which building the curve takes less time than it saves.
+const FEWEST: usize = 128;
+
+/// `sum_j g_j max(x - eta_j, 0) - sum_j h_j max(eta_j - x, 0)`; terms are `(eta, g, h)`.
 fn curve(mut terms: Vec<(f64, f64, f64)>) -> Curve {
     terms.sort_by(|a, b| a.0.total_cmp(&b.0));
     let all = |part: fn(&(f64, f64, f64)) -> f64| sums(terms.iter().map(part));
-    // below: what the knots that x has passed add; above: what the others still take
+    // `below`: terms g of the knots below x; `above`: terms h of the knots above x
     let (below, below_moment) = (all(|t| t.1), all(|t| t.1 * t.0));
     let rest = |part: fn(&(f64, f64, f64)) -> f64| {
         let mut rest = sums(terms.iter().rev().map(part));
@@ -21,15 +24,14 @@ fn curve(mut terms: Vec<(f64, f64, f64)>) -> Curve {
     Curve::new(terms.iter().map(|term| term.0).collect(), lines)
 }
 
-/// Whether a signal is long enough for it to pay that the curve is worked out first.
+/// Whether a signal is long enough for [`in_place`] to be the faster choice.
 pub(crate) fn pays(zones: usize, samples: usize) -> bool {
-    const FEWEST: usize = 128;
     zones > 1 && samples >= FEWEST.max(4 * zones)
 }
 
-/// Outputs of deadzones in place of their inputs; `previous` is the input before the first one and moves on.
+/// Replaces inputs by the outputs of deadzones; `previous` is u(k-1) and is updated.
 ///
-/// The same as sample by sample up to rounding. `false`, and nothing done, where an input is not finite.
+/// The outputs equal those of the definition up to rounding. Does nothing and returns `false` if an input is not finite.
 pub(crate) fn in_place(
     thresholds: &[f64],
     weights: &[f64],

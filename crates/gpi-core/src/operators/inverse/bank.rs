@@ -1,14 +1,16 @@
 //! The inverse of a bank of plays is a bank of plays.
 
+use crate::operators::storage::sort_by_key;
 use crate::operators::{OperatorError, PlayBank, PlayBankState, Sample, Storage};
 
 impl<S: Storage> PlayBank<S> {
-    /// The bank that undoes this one, its plays from narrow to wide.
+    /// The inverse bank P^-1, its plays in ascending order of half-widths.
     ///
-    /// With half-widths in order, `r_0 = 0`, and `P_i = p_0 + .. + p_i`: half-widths
-    /// `r'_i = sum_{j <= i} p_j (r_i - r_j)`, weights `p'_0 = 1 / P_0`, `p'_i = 1 / P_i - 1 / P_{i-1}`
-    /// (K. Kuhnen, *Modeling, identification and compensation of complex hysteretic nonlinearities*, European
-    /// Journal of Control 9, 2003). Of plays with the same half-width the last one stands for all.
+    /// For half-widths in ascending order with `r_0 = 0`, and with the slopes `P_i = p_0 + .. + p_i`, the inverse has the
+    /// half-widths `r'_i = sum_{j <= i} p_j (r_i - r_j)` and the weights `p'_0 = 1 / P_0`,
+    /// `p'_i = 1 / P_i - 1 / P_{i-1}` (K. Kuhnen, *Modeling, identification and compensation of complex hysteretic
+    /// nonlinearities*, European Journal of Control 9, 2003). Of plays with equal half-widths, the last one gets the
+    /// weight of all and the others get zero.
     ///
     /// ```
     /// use gpi_core::operators::{Operator, PlayBank};
@@ -23,10 +25,15 @@ impl<S: Storage> PlayBank<S> {
     /// ```
     ///
     /// # Errors
-    /// A slope P_i that is not positive; without a play of half-width zero the first one is zero.
+    /// A slope P_i is not positive; P_0 is zero if no play has the half-width zero.
     pub fn inverse(&self) -> Result<Self, OperatorError> {
+        let not_rising = |index, slope: S::Item| {
+            let slope = slope.into();
+            Err(OperatorError::NotRising { parameter: "weights", index, slope })
+        };
         let zero = S::Item::ZERO;
-        let (r, [p]) = self.in_order([self.weights.clone()]);
+        let (mut r, mut p) = (self.half_widths.clone(), self.weights.clone());
+        sort_by_key(&mut r, [&mut p]);
         let (mut half_widths, mut weights) = (r.clone(), p.clone());
         let widths = r.values().iter().zip(r.values().iter().skip(1)).map(Some).chain([None]);
         let columns =
@@ -34,7 +41,7 @@ impl<S: Storage> PlayBank<S> {
         let (mut slope, mut before, mut width, mut size) = (zero, zero, zero, zero);
         for (index, (((neighbours, &own), half_width), weight)) in columns.enumerate() {
             if index == 0 && r.values().first() != Some(&zero) {
-                return Err(OperatorError::NotRising { parameter: "weights", index, slope: 0.0 });
+                return not_rising(index, zero);
             }
             (*half_width, *weight) = (width, zero);
             slope = slope + own;
@@ -43,8 +50,7 @@ impl<S: Storage> PlayBank<S> {
                 continue;
             }
             if slope <= S::Item::EPSILON * size {
-                let slope = slope.into();
-                return Err(OperatorError::NotRising { parameter: "weights", index, slope });
+                return not_rising(index, slope);
             }
             let one = S::Item::ONE;
             *weight = if before > zero { (before - slope) / (slope * before) } else { one / slope };
@@ -54,23 +60,25 @@ impl<S: Storage> PlayBank<S> {
             }
         }
         if before == zero {
-            return Err(OperatorError::NotRising { parameter: "weights", index: 0, slope: 0.0 });
+            return not_rising(0, zero);
         }
         Self::new(half_widths, weights)
     }
 
-    /// Where the plays of [`PlayBank::inverse`] stand when those of this bank stand so:
+    /// The state of [`PlayBank::inverse`] that corresponds to a state of this bank:
     /// `F'_i = P_i F_i + sum_{j > i} p_j F_j`.
     ///
     /// # Errors
-    /// Plays further apart than their half-widths allow, which no input brings about.
+    /// The outputs of two plays differ by more than their half-widths do; no input leads to such a state.
     pub fn inverse_state(
         &self,
         state: &PlayBankState<S>,
     ) -> Result<PlayBankState<S>, OperatorError> {
-        let (r, [p, places]) = self.in_order([self.weights.clone(), state.plays.clone()]);
-        let stand = r.values().iter().zip(places.values());
-        for (index, ((r, place), (wider, next))) in stand.clone().zip(stand.skip(1)).enumerate() {
+        let (mut r, mut p) = (self.half_widths.clone(), self.weights.clone());
+        let mut places = state.plays.clone();
+        sort_by_key(&mut r, [&mut p, &mut places]);
+        let plays = r.values().iter().zip(places.values());
+        for (index, ((r, place), (wider, next))) in plays.clone().zip(plays.skip(1)).enumerate() {
             let distance = (*next - *place).at_least(*place - *next);
             let most = *wider - *r;
             let size = next.at_least(-*next) + place.at_least(-*place) + *wider;
@@ -94,23 +102,6 @@ impl<S: Storage> PlayBank<S> {
             wider = wider + *p * *place;
         }
         Ok(PlayBankState { plays: moved })
-    }
-
-    /// The half-widths from narrow to wide, and what belongs to them.
-    fn in_order<const K: usize>(&self, mut belonging: [S; K]) -> (S, [S; K]) {
-        let mut half_widths = self.half_widths.clone();
-        let r = half_widths.values_mut();
-        for next in 1..r.len() {
-            let mut place = next;
-            while place > 0 && r[place - 1] > r[place] {
-                r.swap(place - 1, place);
-                for own in &mut belonging {
-                    own.values_mut().swap(place - 1, place);
-                }
-                place -= 1;
-            }
-        }
-        (half_widths, belonging)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The inverse of the cascade: plays, then deadzones.
+//! The inverse of the cascade: plays followed by deadzones.
 
 use super::curve::Curve;
 use super::envelope::Inverted;
@@ -7,11 +7,11 @@ use crate::operators::{
     Storage, play,
 };
 
-/// `u = D^-1[P^-1[v]]`: the drive that makes a [`Gpi`] give v, exactly.
+/// The exact inverse of a [`Gpi`], `u = D^-1[P^-1[v]]`: the drive u for which the cascade's output is v.
 ///
-/// P^-1 are plays ([`PlayBank::inverse`]), D^-1 deadzones, so that a step costs what the forward one does. What the
-/// drive's limits do not reach is clamped: the drive stops at its limit, the plays go on from there as they do
-/// forwards, and [`InverseState::out_of_reach`] counts the sample.
+/// P^-1 is a bank of plays ([`PlayBank::inverse`]) and D^-1 a sum of deadzones, so a step costs as much as a forward
+/// step. If v would need a drive beyond its limits, the drive stays at the limit, the state of the plays follows the v
+/// that this drive reaches, and [`InverseState::out_of_reach`] counts the sample.
 ///
 /// ```
 /// use gpi_core::operators::{Deadzones, Gpi, Operator, PlayBank, Reading};
@@ -29,20 +29,20 @@ use crate::operators::{
 pub struct InverseGpi<E: Storage, S> {
     plays: PlayBank<S>,
     envelope: Deadzones<E>,
-    /// The envelope, for one sample.
+    /// The envelope D^-1 as a curve, which a single sample evaluates faster.
     curve: Curve<E>,
     drive: [E::Item; 2],
     reach: [E::Item; 2],
-    /// Between these every v is within reach, wherever the plays stand.
+    /// The interval of v that is within reach for every state of the plays.
     safe: [E::Item; 2],
 }
 
-/// What an [`InverseGpi`] remembers.
+/// The state of an [`InverseGpi`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct InverseState<S> {
-    /// State of its plays.
+    /// State of the plays P^-1.
     pub plays: PlayBankState<S>,
-    /// Samples at which the drive stopped at its limit, as many as fit into the counter.
+    /// Number of samples at which the drive was clamped to a limit; the counter saturates.
     pub out_of_reach: u32,
 }
 
@@ -51,19 +51,19 @@ where
     E: Storage,
     S: Storage<Item = E::Item>,
 {
-    /// The inverse, as far around zero as the envelope rises.
+    /// The inverse on the interval around zero in which the envelope increases.
     ///
     /// # Errors
-    /// A slope of the plays, or of the envelope at zero, that is not positive; directional deadzones.
+    /// A slope of the plays, or of the envelope at zero, is not positive; the deadzone convention is directional.
     pub fn inverse(&self) -> Result<InverseGpi<E, S>, OperatorError> {
         let infinity = E::Item::INFINITY;
         self.inverse_within(-infinity, infinity)
     }
 
-    /// The inverse whose drive stays between two limits, in the unit of u.
+    /// The inverse with a drive between two limits, in the unit of u.
     ///
     /// # Errors
-    /// As [`Gpi::inverse`], or limits between which the envelope does not rise.
+    /// As [`Gpi::inverse`], or the envelope does not increase between the limits.
     pub fn inverse_within(
         &self,
         lower: E::Item,
@@ -76,10 +76,10 @@ where
         Ok(InverseGpi { plays, envelope, curve, drive, reach, safe })
     }
 
-    /// The state of [`Gpi::inverse`] that belongs to a state of the cascade.
+    /// The state of [`Gpi::inverse`] that corresponds to a state of the cascade.
     ///
     /// # Errors
-    /// Plays further apart than their half-widths allow, which no input brings about.
+    /// The outputs of two plays differ by more than their half-widths do; no input leads to such a state.
     pub fn inverse_state(
         &self,
         state: &GpiState<E::Item, S>,
@@ -88,8 +88,9 @@ where
     }
 }
 
-/// The v for which z stays within reach wherever plays stand that an input has brought there: z is at most
-/// `v P' + sum_j (r'_j - r'_{j-1}) |p'_j + p'_{j+1} + ..|`, P' the sum of all weights.
+/// The interval of v for which z is within reach for every state that an input leads to.
+///
+/// z is at most `v P' + sum_j (r'_j - r'_{j-1}) |p'_j + p'_{j+1} + ..|`, where P' is the sum of all weights p'_j.
 fn safe<S: Storage>(plays: &PlayBank<S>, reach: [S::Item; 2]) -> [S::Item; 2] {
     let zero = S::Item::ZERO;
     let (mut slack, mut tail) = (zero, zero);
@@ -108,32 +109,32 @@ where
     E: Storage,
     S: Storage<Item = E::Item>,
 {
-    /// P^-1, from v to z.
+    /// The bank of plays P^-1, from v to z.
     pub fn plays(&self) -> &PlayBank<S> {
         &self.plays
     }
 
-    /// D^-1, from z to u.
+    /// The envelope D^-1, from z to u.
     pub fn envelope(&self) -> &Deadzones<E> {
         &self.envelope
     }
 
-    /// D^-1 as a curve, of which a sample needs one piece.
+    /// D^-1 as a piecewise linear curve.
     pub fn curve(&self) -> &Curve<E> {
         &self.curve
     }
 
-    /// The lowest and the highest drive u.
+    /// The limits of the drive u, lower first.
     pub fn drive(&self) -> [E::Item; 2] {
         self.drive
     }
 
-    /// The lowest and the highest z, the envelope's outputs at these drives.
+    /// The limits of z, lower first: the forward envelope's outputs at the limits of the drive.
     pub fn reach(&self) -> [E::Item; 2] {
         self.reach
     }
 
-    /// The lowest and the highest v that are within reach wherever the plays stand.
+    /// The limits of v that is within reach for every state of the plays, lower first.
     pub fn safe(&self) -> [E::Item; 2] {
         self.safe
     }
@@ -144,7 +145,7 @@ where
         self.curve.at(z).at_most(self.drive[1]).at_least(self.drive[0])
     }
 
-    /// The drive u for v, and the v that it reaches.
+    /// The drive u for v, and the v that this drive reaches.
     #[inline]
     pub fn step_reached(&self, state: &mut InverseState<S>, v: E::Item) -> (E::Item, E::Item) {
         if v < self.safe[0] || v > self.safe[1] {
@@ -154,7 +155,7 @@ where
         }
     }
 
-    /// The step where v may be out of reach.
+    /// [`InverseGpi::step_reached`] for a v that may be out of reach.
     #[cold]
     fn step_to_limit(&self, state: &mut InverseState<S>, v: E::Item) -> (E::Item, E::Item) {
         let z = self.plays.output_for(&state.plays, v);
@@ -170,29 +171,26 @@ where
 }
 
 impl<S: Storage> PlayBank<S> {
-    /// The output for an input, while the plays stay where they stand.
-    fn output_for(&self, state: &PlayBankState<S>, input: S::Item) -> S::Item {
-        let plays = self.half_widths.values().iter().zip(self.weights.values());
-        let outputs =
-            plays.zip(state.plays.values()).map(|((r, p), place)| *p * play(*r, input, *place));
-        outputs.fold(S::Item::ZERO, |sum, output| sum + output)
+    /// The half-width, the weight and the output of each play.
+    fn terms(&self, state: &PlayBankState<S>) -> impl Iterator<Item = [S::Item; 3]> {
+        let own = self.half_widths.values().iter().zip(self.weights.values());
+        own.zip(state.plays.values()).map(|((r, p), place)| [*r, *p, *place])
     }
 
-    /// The input for which plays from narrow to wide, with slopes that are positive, give an output.
+    /// The output for an input, without an update of the state.
+    fn output_for(&self, state: &PlayBankState<S>, input: S::Item) -> S::Item {
+        let terms = self.terms(state);
+        terms.fold(S::Item::ZERO, |sum, [r, p, place]| sum + p * play(r, input, place))
+    }
+
+    /// The input for an output; needs plays in ascending order of half-widths and positive slopes.
     fn input_for(&self, state: &PlayBankState<S>, output: S::Item) -> S::Item {
-        let plays = || {
-            let own = self.half_widths.values().iter().zip(self.weights.values());
-            own.zip(state.plays.values()).map(|((r, p), place)| (*r, *p, *place))
-        };
         let zero = S::Item::ZERO;
-        let (mut input, mut reached, mut slope) = (zero, zero, zero);
-        for (index, (_, p, place)) in plays().enumerate() {
-            input = if index == 0 { place } else { input };
-            reached = reached + p * place;
-        }
+        let (mut slope, mut input) = (zero, state.plays.values().first().copied().unwrap_or(zero));
+        let mut reached = self.terms(state).fold(zero, |sum, [_, p, place]| sum + p * place);
         let rises = output > reached;
-        for (r, p, place) in plays() {
-            // from here on the next wider play moves along
+        for [r, p, place] in self.terms(state) {
+            // beyond this input the next wider play changes too
             let turn = if rises { place + r } else { place - r };
             let there = reached + slope * (turn - input);
             if (rises && there > output) || (!rises && there < output) {
@@ -212,7 +210,7 @@ where
     type Sample = E::Item;
     type State = InverseState<S>;
 
-    /// The state that belongs to the cascade at rest.
+    /// The state that corresponds to the initial state of the cascade.
     fn rest(&self) -> InverseState<S> {
         InverseState { plays: self.plays.rest(), out_of_reach: 0 }
     }
@@ -223,16 +221,7 @@ where
         self.step_reached(state, v).0
     }
 
-    fn block(&self, state: &mut Self::State, input: &[E::Item], output: &mut [E::Item]) -> usize {
-        for (output, input) in output.chunks_mut(IN_CACHE).zip(input.chunks(IN_CACHE)) {
-            let samples = input.len().min(output.len());
-            output[..samples].copy_from_slice(&input[..samples]);
-            self.in_place(state, &mut output[..samples]);
-        }
-        input.len().min(output.len())
-    }
-
-    /// As fast as the forward operators where v is within reach.
+    /// As fast as the forward operators if v is within reach.
     fn in_place(&self, state: &mut InverseState<S>, signal: &mut [E::Item]) {
         for block in signal.chunks_mut(IN_CACHE) {
             let is_beyond = |v: &E::Item| *v < self.safe[0] || *v > self.safe[1];

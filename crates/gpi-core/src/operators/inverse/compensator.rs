@@ -1,17 +1,17 @@
-//! From a reference to the drive, one sample at a time.
+//! A compensator that computes the drive for a reference, one sample at a time.
 
 use super::cascade::{InverseGpi, InverseState};
 use crate::operators::error::require_finite;
 use crate::operators::{Lags, LagsState, Operator, OperatorError, Sample, Storage};
 
-/// `u = D^-1[P^-1[v]]`, `v = (r - offset - sum_i c_i l_i) / gain`: the drive that makes an actuator with creep follow a
-/// reference r that is slow next to its dynamics.
+/// The drive `u = D^-1[P^-1[v]]`, `v = (r - offset - sum_i c_i l_i) / gain`, for which an actuator with creep follows a
+/// reference r that is slow compared with its dynamics.
 ///
-/// The actuator is `y = gain v + sum_i c_i l_i + offset`, v from a [`crate::operators::Gpi`] and l_i its [`Lags`]. What
-/// the lags add to a sample does not depend on v of that sample, so that it is known beforehand. Where the drive stops
-/// at a limit, creep goes on with the v that is reached.
+/// The actuator is `y = gain v + sum_i c_i l_i + offset`, where v is the output of a [`crate::operators::Gpi`] and l_i
+/// are [`Lags`]. The creep of a sample does not depend on v of the same sample, so it is known before v is computed. If
+/// the drive is clamped to a limit, creep follows the v that this drive reaches.
 ///
-/// `E`, `S` and `L` store the deadzones, the plays and the lags: `[T; N]` on firmware.
+/// `E`, `S` and `L` store the parameters of deadzones, plays and lags: `[T; N]` on firmware.
 ///
 /// ```
 /// use gpi_core::operators::{Compensator, Deadzones, Gpi, Lags, Operator, PlayBank, Reading};
@@ -35,14 +35,14 @@ pub struct Compensator<E: Storage, S, L> {
     offset: E::Item,
 }
 
-/// What a [`Compensator`] remembers.
+/// The state of a [`Compensator`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompensatorState<S: Storage, L> {
-    /// Where the plays stand, and how many samples were out of reach.
+    /// State of the inverse hysteresis, with the number of samples out of reach.
     pub hysteresis: InverseState<S>,
-    /// Where creep stands.
+    /// State of the creep.
     pub creep: LagsState<L>,
-    /// The last drive.
+    /// The latest drive, in the unit of u.
     pub drive: S::Item,
 }
 
@@ -52,10 +52,10 @@ where
     S: Storage<Item = E::Item>,
     L: Storage<Item = E::Item>,
 {
-    /// From the inverse of the hysteresis, creep, the DC gain of the dynamics and the output at v = 0.
+    /// A compensator from the inverse hysteresis, the creep, the DC gain of the dynamics and the output at v = 0.
     ///
     /// # Errors
-    /// A gain of zero or one that is cancelled by creep; numbers that are not finite.
+    /// The gain is zero or cancelled by creep, or a number is not finite.
     pub fn new(
         hysteresis: InverseGpi<E, S>,
         creep: Lags<L>,
@@ -67,7 +67,7 @@ where
         let size = |value: E::Item| value.at_least(-value);
         let largest = creep.gains().iter().fold(size(gain), |sum, &c| sum + size(c));
         let compensator = Self { hysteresis, creep, gain, offset };
-        let slope = size(gain).at_most(size(compensator.standing_gain()));
+        let slope = size(gain).at_most(size(compensator.steady_gain()));
         if slope <= E::Item::EPSILON * largest {
             let slope = slope.into();
             return Err(OperatorError::NotRising { parameter: "gain", index: 0, slope });
@@ -75,34 +75,34 @@ where
         Ok(compensator)
     }
 
-    /// The inverse of the hysteresis.
+    /// The inverse hysteresis, from v to u.
     pub fn hysteresis(&self) -> &InverseGpi<E, S> {
         &self.hysteresis
     }
 
-    /// Creep.
+    /// The creep, from v to y.
     pub fn creep(&self) -> &Lags<L> {
         &self.creep
     }
 
-    /// The DC gain from v to the output, creep apart.
+    /// The DC gain from v to y without creep.
     pub fn gain(&self) -> E::Item {
         self.gain
     }
 
-    /// The output at v = 0.
+    /// The output y at v = 0.
     pub fn offset(&self) -> E::Item {
         self.offset
     }
 
-    /// From v to the output where all stands still.
-    fn standing_gain(&self) -> E::Item {
+    /// The steady-state gain from v to y, with creep.
+    fn steady_gain(&self) -> E::Item {
         self.creep.gains().iter().fold(self.gain, |sum, &gain| sum + gain)
     }
 
-    /// An actuator that was brought from zero to this reference long ago.
+    /// The steady state after the reference changed from zero to this value.
     pub fn standing_at(&self, reference: E::Item) -> CompensatorState<S, L> {
-        let v = (reference - self.offset) / self.standing_gain();
+        let v = (reference - self.offset) / self.steady_gain();
         let mut hysteresis = self.hysteresis.rest();
         let (drive, reached) = self.hysteresis.step_reached(&mut hysteresis, v);
         hysteresis.out_of_reach = 0;
@@ -119,12 +119,12 @@ where
     type Sample = E::Item;
     type State = CompensatorState<S, L>;
 
-    /// The actuator at v = 0.
+    /// The initial state: v = 0.
     fn rest(&self) -> CompensatorState<S, L> {
         self.standing_at(self.offset)
     }
 
-    /// The drive u for a sample of the reference; one that is not finite holds the drive.
+    /// The drive u for one sample of the reference; a sample that is not finite holds the drive.
     #[inline]
     fn step(&self, state: &mut CompensatorState<S, L>, reference: E::Item) -> E::Item {
         if reference.finite() {

@@ -1,9 +1,10 @@
-//! One-sided deadzones as what they are: a curve of straight pieces.
+//! A sum of one-sided deadzones as a piecewise linear curve.
 
+use crate::operators::storage::sort_by_key;
 use crate::operators::{Deadzones, Operator, Sample, Storage};
 
-/// `height_j + slope_j (z - knot_j)`, j the last knot at or below z; below all of them the first knot with a slope of
-/// its own. A search among n knots takes log2 n comparisons, where the sum of deadzones takes n terms.
+/// `height_j + slope_j (z - knot_j)`, where j is the last knot at or below z; below all knots, j is the first knot with
+/// the slope [`Curve::below`]. The search among n knots takes log2 n comparisons; the sum of deadzones has n terms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve<S: Storage> {
     knots: S,
@@ -13,26 +14,18 @@ pub struct Curve<S: Storage> {
 }
 
 impl<S: Storage> Curve<S> {
-    /// Of at least one deadzone.
+    /// The curve of one-sided deadzones.
     pub(super) fn new(zones: &Deadzones<S>) -> Self {
         let zero = S::Item::ZERO;
         let (mut knots, mut weights) = (zones.thresholds.clone(), zones.weights.clone());
-        let (places, own) = (knots.values_mut(), weights.values_mut());
-        for next in 1..places.len() {
-            let mut place = next;
-            while place > 0 && places[place - 1] > places[place] {
-                places.swap(place - 1, place);
-                own.swap(place - 1, place);
-                place -= 1;
-            }
-        }
-        let below = knots.values().iter().zip(own.iter());
+        sort_by_key(&mut knots, [&mut weights]);
+        let below = knots.values().iter().zip(weights.values());
         let below = below.fold(zero, |sum, (&eta, &g)| if eta <= zero { sum + g } else { sum });
         let (mut heights, mut slopes, mut slope) = (knots.clone(), weights.clone(), below);
         let rows = heights.values_mut().iter_mut().zip(slopes.values_mut());
         for ((height, own), &eta) in rows.zip(knots.values()) {
             *height = zones.step(&mut zones.rest(), eta);
-            // from here on one above zero is passed, and one below zero left behind
+            // beyond a threshold, the upper deadzone contributes and the lower one no longer does
             if eta > zero {
                 slope = slope + *own;
             } else if eta < zero {
@@ -43,7 +36,7 @@ impl<S: Storage> Curve<S> {
         Self { knots, heights, slopes, below }
     }
 
-    /// Where the pieces meet, in order.
+    /// The knots in ascending order, in the unit of z.
     pub fn knots(&self) -> &[S::Item] {
         self.knots.values()
     }
@@ -53,12 +46,12 @@ impl<S: Storage> Curve<S> {
         self.heights.values()
     }
 
-    /// The slope behind each knot.
+    /// The slope above each knot.
     pub fn slopes(&self) -> &[S::Item] {
         self.slopes.values()
     }
 
-    /// The slope before the first knot.
+    /// The slope below the first knot.
     pub fn below(&self) -> S::Item {
         self.below
     }

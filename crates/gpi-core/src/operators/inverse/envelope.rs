@@ -2,18 +2,20 @@
 
 use crate::operators::{Deadzones, Operator, OperatorError, Reading, Sample, Storage};
 
-/// An envelope turned around, and where that holds.
+/// The inverse of an envelope, and the interval in which it is one.
 pub(super) struct Inverted<S: Storage> {
     pub envelope: Deadzones<S>,
-    /// Inputs of the forward envelope, lowest and highest.
+    /// The limits of the forward envelope's input, lower first.
     pub drive: [S::Item; 2],
-    /// Its outputs there.
+    /// The forward envelope's outputs at these limits.
     pub reach: [S::Item; 2],
 }
 
 impl<S: Storage> Deadzones<S> {
-    /// The inverse of one-sided deadzones around zero, as far as they rise there within limits: the curve through
-    /// the origin with the slopes `1 / S_j` beyond `D(eta_j)`, S_j the slope of D beyond eta_j.
+    /// The inverse of one-sided deadzones on the interval around zero, within `limits`, in which they increase.
+    ///
+    /// It is the curve through the origin with the slopes `1 / S_j` beyond `D(eta_j)`, where S_j is the slope of D beyond
+    /// eta_j.
     pub(super) fn inverse(&self, limits: [S::Item; 2]) -> Result<Inverted<S>, OperatorError> {
         if self.reading() == Reading::Directional {
             return Err(OperatorError::Directional);
@@ -42,7 +44,7 @@ impl<S: Storage> Deadzones<S> {
                 continue;
             }
             *place = self.at(eta);
-            // of equal thresholds the last one stands for all
+            // of equal thresholds, the last one gets the weight of all
             let is_upper = eta > zero;
             let before = |other: S::Item| {
                 if is_upper { zero < other && other < eta } else { eta < other && other < zero }
@@ -58,7 +60,7 @@ impl<S: Storage> Deadzones<S> {
             }
             let beyond = slope + own;
             if !(slope > least && beyond > least) {
-                // where it ceases to rise, it ends
+                // the inverse ends where the envelope stops increasing
                 if is_upper {
                     drive[1] = drive[1].at_most(eta);
                 } else {
@@ -68,7 +70,7 @@ impl<S: Storage> Deadzones<S> {
                 *weight = -own / (beyond * slope);
             }
         }
-        // what lies beyond the end is without effect
+        // thresholds beyond the limits have no effect
         let columns = weights.values_mut().iter_mut().zip(self.thresholds());
         for (weight, &eta) in columns {
             if eta > drive[1] || eta < drive[0] {
@@ -84,7 +86,7 @@ impl<S: Storage> Deadzones<S> {
         Ok(Inverted { envelope, drive, reach })
     }
 
-    /// The output of one sample; without an end where the input has none.
+    /// The output for one input; infinite for an infinite input.
     fn at(&self, input: S::Item) -> S::Item {
         if input.finite() { self.step(&mut self.rest(), input) } else { input }
     }

@@ -1,4 +1,4 @@
-//! The exact inverse of the cascade: what to drive it with so that it gives a wanted signal.
+//! The exact inverse of the cascade: the drive u for a wanted signal v.
 
 mod bank;
 mod cascade;

@@ -1,21 +1,21 @@
-//! Sums of products in twice the precision: a number is the unevaluated sum of two.
+//! Arithmetic in twice the working precision (double-double): a number is the unevaluated sum of two `f64`.
 //!
-//! A sum of products that cancels keeps as many digits as the data have, so that a Gram matrix in this precision
-//! says of a regressor what its orthogonal decomposition says (Dekker 1971; Ogita, Rump and Oishi 2005).
+//! A sum of products then keeps the digits of the data even under cancellation, so a Gram matrix in this precision
+//! determines as much of a regressor as its orthogonal decomposition does (Dekker 1971; Ogita, Rump and Oishi 2005).
 
 use pulp::{Scalar, Simd};
 
-/// `high + low`, each lane of a vector by itself; |low| is at most half a unit in the last place of high.
+/// `high + low` in each lane of a vector; |low| is at most half a unit in the last place of high.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DoubleDouble<S: Simd> {
     pub high: S::f64s,
     pub low: S::f64s,
 }
 
-/// One number.
+/// A single number.
 pub(super) type Number = DoubleDouble<Scalar>;
 
-/// `a + b` and what rounding took from it.
+/// `a + b` and its rounding error.
 #[inline(always)]
 fn two_sum<S: Simd>(simd: S, a: S::f64s, b: S::f64s) -> (S::f64s, S::f64s) {
     let sum = simd.add_f64s(a, b);
@@ -24,7 +24,7 @@ fn two_sum<S: Simd>(simd: S, a: S::f64s, b: S::f64s) -> (S::f64s, S::f64s) {
     (sum, simd.add_f64s(left, simd.sub_f64s(b, part)))
 }
 
-/// `a b` and what rounding took from it.
+/// `a b` and its rounding error.
 #[inline(always)]
 fn two_product<S: Simd>(simd: S, a: S::f64s, b: S::f64s) -> (S::f64s, S::f64s) {
     let product = simd.mul_f64s(a, b);
@@ -32,7 +32,7 @@ fn two_product<S: Simd>(simd: S, a: S::f64s, b: S::f64s) -> (S::f64s, S::f64s) {
 }
 
 impl<S: Simd> DoubleDouble<S> {
-    /// Brings what has gathered in `low` back to its place.
+    /// Normalizes: moves the large part of `low` to `high`.
     #[inline(always)]
     fn settled(self, simd: S) -> Self {
         let high = simd.add_f64s(self.high, self.low);
@@ -132,20 +132,21 @@ pub(super) fn product(a: f64, b: f64) -> Number {
     Number { high, low }
 }
 
-/// Samples that one vector of any processor divides.
+/// Number of samples that is a multiple of the vector width of every processor.
 pub(super) const WIDTH: usize = 8;
+
+/// Lags that are summed at once: independent sums hide the latency of the additions.
+const AT_ONCE: usize = 4;
 
 /// Adds `sum_k target[k] source[lags - 1 + k - lag]` to the sum of each lag.
 ///
-/// `target` holds a multiple of [`WIDTH`] numbers and `source` `lags - 1` more.
+/// The length of `target` is a multiple of [`WIDTH`]; `source` has `lags - 1` elements more.
 pub(super) fn lagged_products(target: &[f64], source: &[f64], sums: &mut [Number]) {
     struct Products<'a>(&'a [f64], &'a [f64], &'a mut [Number]);
     impl pulp::WithSimd for Products<'_> {
         type Output = ();
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) {
-            /// Lags whose sums do not wait for each other.
-            const AT_ONCE: usize = 4;
             let Self(target, source, sums) = self;
             let largest = largest(simd, target) * largest(simd, source);
             if largest == 0.0 {
@@ -184,10 +185,10 @@ fn largest<S: Simd>(simd: S, values: &[f64]) -> f64 {
     most.into_iter().chain(rest.iter().map(|value| value.abs())).fold(0.0, f64::max)
 }
 
-/// The products of some lags that follow each other; the least one ends where `source` ends.
+/// The sums of a few consecutive lags; the smallest lag ends where `source` ends.
 ///
-/// A sum begins at a number so large that every product rounds to the same grid: what it grows by is then exact, and
-/// what rounding left of the product too (Zielke and Drygalla 2003; Rump, Ogita and Oishi 2008).
+/// Each sum starts at a number so large that every product is rounded to the same grid. The increments of the sum are
+/// then exact, and so are the rounding errors of the products (Zielke and Drygalla 2003; Rump, Ogita and Oishi 2008).
 #[inline(always)]
 fn group<S: Simd, const LAGS: usize>(
     simd: S,

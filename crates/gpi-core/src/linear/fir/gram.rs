@@ -1,19 +1,30 @@
-//! Least squares from a Gram matrix in twice the working precision, as good as by an orthogonal decomposition.
+//! The Gram matrix of a regressor in twice the working precision, and its pivoted Cholesky decomposition.
+//!
+//! For a regressor A (rows, unknowns) and targets y (rows, targets), the decomposition `P^T A^T A P = r^T r` has the same
+//! r as `A P = Q r`, and `z = Q^T y` follows from `A^T y`. The condition number of `A^T A` is the square of A's, so it
+//! needs twice the digits.
 
-use super::decompose::{Svd, singular_values, svd};
 use super::double_double::{DoubleDouble, Number};
-use crate::{Error, Matrix};
+use super::triangular_factor::TriangularFactor;
+use crate::Matrix;
 use pulp::{Scalar, Simd};
 
-/// The lower part of `[A y]^T A`, with a regressor A and targets y, and the sum of squares of each target.
+/// Columns that are decomposed at once: they fit into the second-level cache.
+const PANEL: usize = 32;
+
+/// A column counts as a combination of earlier ones if no more than this fraction of its sum of squares is left: 1e-14
+/// of its length, about the rounding error of an orthogonal decomposition in working precision.
+const DEPENDENT: f64 = 1e-28;
+
+/// The lower part of `[A y]^T A`, for a regressor A and targets y, and the sum of squares of each target.
 #[derive(Clone, Debug)]
 pub(super) struct Gram {
     unknowns: usize,
     rows: usize,
-    /// Columns one after the other; what is above the diagonal is not used.
+    /// By columns, (unknowns + targets, unknowns); elements above the diagonal are not used.
     high: Vec<f64>,
     low: Vec<f64>,
-    /// What the means took from the diagonal.
+    /// The part of each diagonal element that was removed with the means.
     means: Vec<f64>,
     pub squares: Vec<Number>,
 }
@@ -57,7 +68,7 @@ impl Gram {
         }
     }
 
-    /// Takes the mean out of columns whose sums over so many rows are given, the targets' after the regressor's.
+    /// Removes the means of columns; `sums` over `count` rows are those of the regressor, then those of the targets.
     pub(super) fn take_means(&mut self, sums: &[Number], count: usize) {
         let count = Number::from(count as f64);
         for column in 0..self.unknowns {
@@ -72,10 +83,9 @@ impl Gram {
         }
     }
 
-    /// Cholesky's decomposition, the column that the earlier ones explain least of coming next.
+    /// The Cholesky decomposition. The next pivot is the column of which the earlier ones explain the smallest fraction.
     ///
-    /// Where the mean and the earlier columns make up all that are left to 1e-14 of their length, these get no part of
-    /// their own. Leaving it out moves them by no more than the rounding of an orthogonal decomposition would.
+    /// It ends where the mean and the earlier columns explain all other columns up to [`DEPENDENT`].
     pub(super) fn factor(mut self) -> TriangularFactor {
         struct Decompose<'a>(&'a mut Gram, &'a mut [usize]);
         impl pulp::WithSimd for Decompose<'_> {
@@ -106,7 +116,7 @@ impl Gram {
         self.low.swap(one, other);
     }
 
-    /// Lets two unknowns, the smaller first, change places.
+    /// Exchanges two unknowns, `one <= other`.
     fn exchange(&mut self, one: usize, other: usize) {
         if one == other {
             return;
@@ -118,13 +128,10 @@ impl Gram {
     }
 }
 
-/// Decomposes in place, by panels of columns that stay in the processor's second cache; returns how many columns have
-/// a part of their own. `order` tells which unknown has come where.
+/// Decomposes in place, panel by panel; returns the number of independent columns. `order` holds the unknown of each
+/// column.
 #[inline(always)]
 fn decompose<S: Simd>(simd: S, gram: &mut Gram, order: &mut [usize]) -> usize {
-    const PANEL: usize = 32;
-    /// Of a column's square that is left when it counts as made up by those before.
-    const DEPENDENT: f64 = 1e-28;
     let (n, rows) = (gram.unknowns, gram.rows);
     let mut left: Vec<Number> = (0..n).map(|column| gram.get(column, column)).collect();
     let mut whole: Vec<f64> =
@@ -162,7 +169,7 @@ fn decompose<S: Simd>(simd: S, gram: &mut Gram, order: &mut [usize]) -> usize {
     n
 }
 
-/// Takes from a column what an earlier one explains of it.
+/// Subtracts from a column the part that an earlier one explains.
 #[inline(always)]
 fn subtract<S: Simd>(simd: S, gram: &mut Gram, column: usize, earlier: usize) {
     let rows = gram.rows;
@@ -191,75 +198,14 @@ fn subtract<S: Simd>(simd: S, gram: &mut Gram, column: usize, earlier: usize) {
     }
 }
 
-/// `A P = Q r`, `z = Q^T y`, and the sum of squares of each target that no unknown explains.
-pub(super) struct TriangularFactor {
-    r: Matrix,
-    z: Matrix,
-    rest: Vec<f64>,
-    /// Which unknown each column of r belongs to.
-    order: Vec<usize>,
-}
-
-/// The minimum-norm solution and what its trustworthiness rests on.
-pub(super) struct Solution {
-    /// (unknowns, targets).
-    pub x: Matrix,
-    /// Singular values of the regressor, descending.
-    pub singular_values: Vec<f64>,
-    /// How many of them exceed the tolerance times the largest.
-    pub rank: usize,
-    /// Sum of squared residuals of each target.
-    pub residual_squares: Vec<f64>,
-}
-
-impl TriangularFactor {
-    /// The minimum-norm solution over the directions whose singular value exceeds `tolerance` times the largest.
-    ///
-    /// `ridge`, relative to the mean eigenvalue, regularizes by three passes of iterated ridge regression, which
-    /// hardly biases what is well excited.
-    pub(super) fn solve(&self, tolerance: f64, ridge: f64) -> Result<Solution, Error> {
-        let rank = |s: &[f64]| s.iter().take_while(|&&value| value > tolerance * s[0]).count();
-        if ridge == 0.0 {
-            let s = self.singular_values()?;
-            let is_whole = rank(&s) == s.len();
-            if let Some(x) = self.r.solve_upper_triangular(&self.z).filter(|_| is_whole) {
-                return Ok(self.solution(x, s.len(), s));
-            }
-        }
-        let Svd { u, s, v } = svd(&self.r)?;
-        let rank = rank(&s);
-        let mut projected = u.columns(0, rank).tr_mul(&self.z);
-        let penalty = ridge * s.iter().map(|value| value * value).sum::<f64>() / s.len() as f64;
-        for (mut row, value) in projected.row_iter_mut().zip(&s) {
-            row *= (1.0 - (penalty / (penalty + value * value)).powi(3)) / value;
-        }
-        Ok(self.solution(v.columns(0, rank) * projected, rank, s))
-    }
-
-    /// From the unknowns in the order of r's columns.
-    fn solution(&self, ordered: Matrix, rank: usize, singular_values: Vec<f64>) -> Solution {
-        let left = &self.z - &self.r * &ordered;
-        let squares = self.rest.iter().zip(left.column_iter());
-        let residual_squares = squares.map(|(rest, left)| rest + left.norm_squared()).collect();
-        let mut x = ordered.clone();
-        for (row, &unknown) in ordered.row_iter().zip(&self.order) {
-            x.row_mut(unknown).copy_from(&row);
-        }
-        Solution { x, singular_values, rank, residual_squares }
-    }
-
-    /// The singular values of the regressor, descending.
-    pub(super) fn singular_values(&self) -> Result<Vec<f64>, Error> {
-        singular_values(&self.r)
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::double_double::product;
     use super::*;
+    use crate::linear::decompose::svd;
 
     fn factor(regressor: &Matrix, target: &Matrix) -> TriangularFactor {
-        let (n, product) = (regressor.ncols(), super::super::double_double::product);
+        let n = regressor.ncols();
         let mut gram = Gram::zeros(n, 1);
         for (row, y) in regressor.row_iter().zip(target.iter()) {
             for j in 0..n {
