@@ -46,6 +46,8 @@ mod progress;
 #[cfg(feature = "identify")]
 mod record;
 #[cfg(feature = "identify")]
+mod simulation_error;
+#[cfg(feature = "identify")]
 mod spectrum;
 #[cfg(feature = "identify")]
 mod uncertainty;
@@ -53,11 +55,13 @@ mod uncertainty;
 #[cfg(feature = "identify")]
 pub use error::{Error, ErrorKind};
 #[cfg(feature = "identify")]
-pub use model::{Hysteresis, Model, ModelState, SimulationError};
+pub use model::{Hysteresis, Model, ModelState};
 #[cfg(feature = "identify")]
 pub use progress::Progress;
 #[cfg(feature = "identify")]
 pub use record::{Channel, Experiment, Record, TimeAxis};
+#[cfg(feature = "identify")]
+pub use simulation_error::SimulationError;
 
 /// A dense matrix of `f64`, stored by columns; signals are (samples, channels).
 #[cfg(feature = "identify")]

@@ -15,8 +15,8 @@ use rayon::prelude::*;
 
 /// Half the steepest descent of the cost of a record, and the cost.
 ///
-/// What a residual says of its sample is carried back through the chain to every place where an unknown
-/// enters, at the price of one more simulation whatever the number of unknowns.
+/// The adjoint pass propagates the sensitivities of the cost to the outputs backwards through the chain, to every place
+/// where an unknown enters.
 pub(crate) fn descent(
     point: &Point,
     table: &Table,
@@ -60,9 +60,9 @@ fn descent_of(
                 let (weight, own) = loss.of(output, *value);
                 cost += own;
                 *value *= weight;
-                let said = *value;
+                let sensitivity = *value;
                 stream.added(output, trace.samples.start + k, |unknown, derivative| {
-                    descent[unknown] += derivative * said;
+                    descent[unknown] += derivative * sensitivity;
                 });
             }
         }
@@ -77,8 +77,8 @@ fn descent_of(
     for Injection { unknown, place, signal, factor } in injections {
         descent[unknown] += factor * back.met[(place, signal)];
     }
-    for (unknown, said) in table.range(Group::State { experiment: index }).zip(back.start) {
-        descent[unknown] += said;
+    for (unknown, sensitivity) in table.range(Group::State { experiment: index }).zip(back.start) {
+        descent[unknown] += sensitivity;
     }
     Ok((descent, cost))
 }
@@ -195,13 +195,13 @@ impl<'a> Back<'a> {
             let (places, rest) = plays.split_at_mut(inner.law.stops());
             let around = work[w.start + number];
             let widths = &mut work[half_widths[number].clone()];
-            let said = inner.law.adjoint(around, widths, own, places);
-            work[z.start + number] = said;
+            let sensitivity = inner.law.adjoint(around, widths, own, places);
+            work[z.start + number] = sensitivity;
             match &inner.sees {
-                Sees::Output(output) => work[y.start + output] += said,
+                Sees::Output(output) => work[y.start + output] += sensitivity,
                 Sees::Mixture { states, inputs } => {
-                    add(&mut self.x, said, states);
-                    add(&mut work[v.clone()], said, inputs);
+                    add(&mut self.x, sensitivity, states);
+                    add(&mut work[v.clone()], sensitivity, inputs);
                 }
             }
             (marks, plays) = (others, rest);
@@ -212,25 +212,26 @@ impl<'a> Back<'a> {
     fn observe(&mut self, work: &mut [f64]) {
         let Places { v, y, .. } = self.places;
         for (output, c) in self.c.iter().enumerate() {
-            let said = work[y.start + output];
-            add(&mut self.x, said, c);
+            let sensitivity = work[y.start + output];
+            add(&mut self.x, sensitivity, c);
             for input in v.clone() {
-                work[input] += self.d[(output, input - v.start)] * said;
+                work[input] += self.d[(output, input - v.start)] * sensitivity;
             }
         }
     }
 
-    /// What stood before the record.
+    /// The steady state before the record.
     fn stand(&mut self, work: &mut [f64]) {
         let Places { v, states, .. } = self.places;
         let mut first = 0;
         for section in &self.sections {
             let order = section.order();
             let standing = section.standing(&Matrix::identity(order, order));
-            let said = standing.tr_mul(&DVector::from_column_slice(&self.x[first..first + order]));
-            add(&mut work[states.start + first..][..order], 1.0, said.as_slice());
+            let sensitivity =
+                standing.tr_mul(&DVector::from_column_slice(&self.x[first..first + order]));
+            add(&mut work[states.start + first..][..order], 1.0, sensitivity.as_slice());
             for (place, b) in v.clone().zip(&self.b) {
-                work[place] += dot(&b[first..first + order], said.as_slice());
+                work[place] += dot(&b[first..first + order], sensitivity.as_slice());
             }
             first += order;
         }

@@ -20,7 +20,7 @@ impl Point {
         effect.place().added().filter(|added| !added.moves_stage() || !self.senses())
     }
 
-    /// What the output gains by a block beside this point's own; `here` is the output.
+    /// What the output gains by one more effect; `here` is the output.
     pub(crate) fn gained_by(
         &self,
         effect: &Effect,

@@ -7,7 +7,7 @@ pub(super) const LANES: usize = 8;
 pub(super) type Lanes = [f64; LANES];
 pub(super) const NONE: Lanes = [0.0; LANES];
 
-/// Rows of numbers that weigh the same values, four rows beside each other.
+/// Rows of numbers that weigh the same values, four rows side by side.
 pub(super) struct Weights {
     /// Of each four rows, by columns; rows of zeros at the end.
     blocks: Vec<Vec<[f64; BLOCK]>>,

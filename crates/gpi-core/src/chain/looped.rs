@@ -55,9 +55,9 @@ pub(crate) fn model() -> Model {
         .unwrap()
 }
 
-/// An experiment of so much swing, from rest or in motion.
+/// An experiment of a given amplitude, from rest or with an unknown initial state.
 pub(crate) fn run(
-    swing: f64,
+    amplitude: f64,
     first: f64,
     warmup: usize,
     held_out: Vec<Range<usize>>,
@@ -65,9 +65,9 @@ pub(crate) fn run(
     let input = Matrix::from_fn(700, 2, |k, input| {
         let t = k as f64 - if first == 0.0 { 20.0 } else { 0.0 };
         let moved = (0.11 * t).sin() + 0.7 * (0.047 * t + input as f64).cos();
-        if t < 0.0 { 0.0 } else { first + swing * moved }
+        if t < 0.0 { 0.0 } else { first + amplitude * moved }
     });
-    let output = Matrix::from_fn(700, 2, |k, o| swing * (0.2 * (k + 3 * o) as f64).sin());
+    let output = Matrix::from_fn(700, 2, |k, o| amplitude * (0.2 * (k + 3 * o) as f64).sin());
     Experiment { input, output, covariates: Matrix::zeros(700, 0), warmup, held_out }
 }
 

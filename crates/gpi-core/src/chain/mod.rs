@@ -1,4 +1,28 @@
-//! The differentiable signal chain of the estimator.
+//! The differentiable signal chain, as the signal flows:
+//!
+//! ```text
+//! u -> input stage -> envelope -> plays -> dynamics -> (+) -> output stage -> (+) -> y
+//! ```
+//!
+//! Each place has one forward definition, which users' [`Model`](crate::Model) and the estimator's
+//! [`Point`](point::Point) share: [`stages`] before and after, [`plays`], [`loops`] around the dynamics. The linear part is
+//! the one block that differs: a state space in a model, [`motion`] in sections for a point.
+//!
+//! For derivatives, let theta be an unknown. It enters the chain at a few places p, where it adds `f_p s_p(k)` per unit,
+//! s_p a signal of the chain ([`injections`]). From there changes run through everything linear behind it:
+//!
+//! ```text
+//! tangent:  dy(k)/dtheta = sum_p sum_(l <= k) h_p(k, l) f_p s_p(l)
+//! adjoint:  dJ/dtheta = sum_p f_p sum_l s_p(l) sum_(k >= l) h_p(k, l) dJ/dy(k)
+//! ```
+//!
+//! with the impulse responses h_p of the chain linearized along its motion: whether a play slides, the slopes of loops and
+//! of the output stage. [`tangents`] carries the changes of eight unknowns forward side by side; [`adjoint`] carries the
+//! cost's sensitivities backward, at the price of one more simulation whatever the number of unknowns (A. Griewank and
+//! A. Walther, *Evaluating Derivatives*, 2008). The tangent and the adjoint of a place stand beside its value.
+//! [`stream`] drives all three through an experiment, block by block.
+//!
+//! The unknowns are the rows of one [`table`], from which values, steps, [`bounds`], [`names`] and injections follow.
 
 pub(crate) mod adjoint;
 pub(crate) mod bounds;

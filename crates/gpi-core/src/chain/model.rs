@@ -81,7 +81,7 @@ impl Model {
         Ok(())
     }
 
-    /// What the effects remember of an input and a v that have stood.
+    /// The states of the effects after a constant input and v.
     pub(crate) fn rest_effects(&self, state: &mut ModelState, input: &[f64], v: &DVector<f64>) {
         let rest = |effect: &Effect| match effect.place() {
             Place::Input(own) => own.rest(input[own.input()]),
@@ -145,7 +145,7 @@ impl Model {
         Ok(())
     }
 
-    /// G and what stands beside it and in its loop.
+    /// G, its loops, and the sections in parallel with G.
     pub(crate) fn respond_from(&self, state: &mut ModelState, v: &Matrix) -> Result<Matrix, Error> {
         let has_loops = self.effects.iter().any(|effect| effect.place().closed_loops().is_some());
         let linear = self.linear();
@@ -207,7 +207,7 @@ impl Model {
     }
 }
 
-/// The delay line and the states of a block's sections after v has stood.
+/// The delay line and the states of an effect's sections after a constant v.
 fn standing(own: &dyn ParallelSections, v: &DVector<f64>, rate: f64) -> Vec<f64> {
     let v = v[own.input()];
     let mut states = vec![v; own.dead_time()];

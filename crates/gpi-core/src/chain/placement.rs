@@ -5,7 +5,7 @@ use super::table::{Group, Table};
 use crate::Matrix;
 
 impl Point {
-    /// The point with one more play, where there is none of its half-width; its past lies between those of
+    /// The point with one more play, where there is none of its half-width; its initial place lies between those of
     /// its neighbours.
     pub(crate) fn with_play(&self, input: usize, half_width: f64, weight: f64) -> Self {
         let mut point = self.clone();
@@ -70,7 +70,7 @@ impl Point {
         dropped
     }
 
-    /// Puts plays without weight at `sides` beside z in turn and, where half-widths may move, spreads
+    /// Puts plays without weight at `sides` from z in turn and, where half-widths may move, spreads
     /// them over the upper half below `limits` (one an input), where plays forget last; returns how
     /// many there are.
     pub(crate) fn put_idle_plays(&mut self, sides: &[f64], limits: Option<&[f64]>) -> usize {

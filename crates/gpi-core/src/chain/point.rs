@@ -8,16 +8,16 @@ use crate::linear::{Section, Sections};
 use nalgebra::DVector;
 use std::ops::Range;
 
-/// What was before the first sample of an experiment.
+/// The initial state of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Past {
-    /// Where the plays stood between their lowest place beside z (-1) and their highest one (1),
-    /// `[input][play]`; `None` when the actuator came from rest.
+    /// The initial places of the plays, as fractions of their half-widths from z (-1 to 1), `[input][play]`; `None` when
+    /// the actuator came from rest.
     pub plays: Option<Vec<Vec<f64>>>,
-    /// Whether the experiment began in motion, so that `state` is to be fitted.
+    /// Whether the initial state is unknown, so that `state` is to be fitted.
     pub moving: bool,
-    /// By how much the state of all [`Point::sections`] at the first scored sample differs from that of an
-    /// actuator that stood still before the record.
+    /// By how much the state of all [`Point::sections`] at the first scored sample differs from the steady
+    /// state before the record.
     pub state: DVector<f64>,
 }
 

@@ -10,7 +10,7 @@ pub(crate) struct Sensing<'a> {
 }
 
 impl<'a> Sensing<'a> {
-    /// The output stood at `first`.
+    /// The displacement was constant at `first`.
     pub(crate) fn new(point: &'a Point, output: usize, first: f64) -> Self {
         let own = point.output_stages().filter(|effect| effect.output() == output);
         let mut value = first;
@@ -23,7 +23,7 @@ impl<'a> Sensing<'a> {
         Self { blocks: blocks.collect() }
     }
 
-    /// Takes one sample through; leaves how changes pass each effect.
+    /// Takes one sample through; appends how changes pass each effect.
     pub(crate) fn step(&mut self, output: f64, moment: Moment, slopes: &mut Vec<Slope>) -> f64 {
         self.blocks.iter_mut().fold(output, |value, (effect, state)| {
             let (sensed, slope) = effect.sense(state, value, moment);

@@ -5,7 +5,7 @@ use super::plays::Plays;
 use crate::operators::Reading;
 use std::ops::Range;
 
-/// Which derivatives are wanted besides those by the weights and slopes.
+/// Which derivatives are wanted in addition to those by the weights and slopes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Derivatives {
     pub thresholds: bool,
@@ -71,8 +71,8 @@ pub(crate) struct Sensitivity<'a> {
 }
 
 impl<'a> Sensitivity<'a> {
-    /// Starts from rest, or with F_i(-1) = z(0) + s_i r_i for `start` s_i in [-1, 1]: a play stands
-    /// beside z, wherever the envelope takes z.
+    /// Starts from rest, or with F_i(-1) = z(0) + s_i r_i for `start` s_i in [-1, 1]: the place of a
+    /// play follows z, wherever the envelope takes z.
     pub(crate) fn new(
         parameters: &'a Parameters,
         start: Option<&'a [f64]>,
@@ -171,7 +171,7 @@ impl<'a> Sensitivity<'a> {
         }
     }
 
-    /// Puts the plays beside the first z, with which they move.
+    /// Puts the plays at the first z plus a fraction of their half-widths; they move with z.
     fn stand(&mut self, z: f64, start: &[f64]) {
         let weights = &self.parameters.weights;
         self.plays.stand(z, start);

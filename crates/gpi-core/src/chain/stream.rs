@@ -132,7 +132,7 @@ impl<'a> Stream<'a> {
         Ok(())
     }
 
-    /// What all blocks leave for derivatives, and the residuals (outputs, scored samples) of each.
+    /// The traces of all blocks, and the residuals (outputs, scored samples) of each.
     pub(crate) fn traces(&mut self) -> Vec<(Trace, Matrix)> {
         let is_scored = self.scored();
         self.blocks().map(|first| self.pass(first, &is_scored)).collect()
@@ -250,7 +250,7 @@ impl<'a> Stream<'a> {
     }
 }
 
-/// The knots beside sample k of `samples`, with their weights in linear interpolation.
+/// The knots next to sample k of `samples`, with their weights in linear interpolation.
 pub(crate) fn hats(k: usize, samples: usize, knots: usize) -> impl Iterator<Item = (usize, f64)> {
     let place = k as f64 / (samples.max(2) - 1) as f64 * (knots - 1) as f64;
     let left = (place as usize).min(knots.saturating_sub(2));

@@ -63,7 +63,7 @@ pub(crate) enum Group {
     Offsets {
         experiment: usize,
     },
-    /// Where the plays of an input stood before an experiment.
+    /// The initial places of the plays of an input in an experiment.
     Plays {
         experiment: usize,
         input: usize,

@@ -16,7 +16,7 @@ use std::ops::Range;
 /// What has decayed so far in a state is nothing.
 const FADED: f64 = 1e-100;
 
-/// What a pass through the chain leaves for its derivatives, of a block of samples.
+/// What the derivatives need of a pass through the chain, for a block of samples.
 pub(crate) struct Trace {
     /// Samples of the experiment.
     pub samples: Range<usize>,
@@ -44,7 +44,7 @@ pub(crate) struct Tangents<'a> {
     sensed: Vec<usize>,
     signals: Signals,
     places: Places,
-    /// The sample before which the state differs from that of an actuator that stood still.
+    /// The sample before which the unknown part of the initial state is added.
     warmup: usize,
     tiles: Vec<Tile>,
 }
@@ -203,7 +203,7 @@ impl<'a> Tangents<'a> {
         faded.for_each(|value| *value = 0.0);
     }
 
-    /// Before the record what is injected at its first sample stood.
+    /// The steady state for what is injected at the first sample.
     #[inline(always)]
     fn stand(&self, tile: &mut Tile) {
         let Places { v, states, .. } = &self.places;
