@@ -14,8 +14,8 @@ pub(crate) struct Past {
     /// Where the plays stood between their lowest place beside z (-1) and their highest one (1),
     /// `[input][play]`; `None` when the actuator came from rest.
     pub plays: Option<Vec<Vec<f64>>>,
-    /// Whether the experiment began in motion, so that `state` is to be fitted.
-    pub moving: bool,
+    /// Whether the initial state is unknown, so that `state` is to be fitted.
+    pub has_unknown_state: bool,
     /// By how much the state of all [`Point::sections`] at the first scored sample differs from that of an
     /// actuator that stood still before the record.
     pub state: DVector<f64>,

@@ -7,10 +7,10 @@ use crate::chain::point::{DynamicsFreedom, Freedom, Past, Point};
 use crate::chain::sensitivity::Derivatives;
 use crate::fit::Grid;
 use crate::fit::minimize::{FitOptions, fit};
+use crate::fit::settings::HysteresisSettings;
 use crate::linear::Sections;
 use crate::operators::Reading;
-use crate::optimize::Loss;
-use crate::optimize::Status;
+use crate::optimize::{Loss, Status};
 use crate::{Channel, Error, Experiment, Hysteresis, Matrix, Record};
 use nalgebra::DVector;
 
@@ -108,7 +108,7 @@ pub fn fit_hysteresis(
         dynamics: Sections::delayed_gain(&Matrix::from_element(1, 1, 1.0), 0),
         effects: Vec::new(),
         rate: 1.0,
-        pasts: vec![Past { plays, moving: true, state: DVector::zeros(0) }],
+        pasts: vec![Past { plays, has_unknown_state: true, state: DVector::zeros(0) }],
         offsets: vec![Matrix::from_element(1, 1, experiment.output.mean())],
     };
     let freedom = Freedom {
@@ -117,7 +117,8 @@ pub fn fit_hysteresis(
         identity: false,
         dynamics: DynamicsFreedom::Nothing,
     };
-    let options = FitOptions { freedom, loss: Loss::squares(1), steps: 60, gain: 1e-4 };
+    let HysteresisSettings { steps, gain } = HysteresisSettings::default();
+    let options = FitOptions { freedom, loss: Loss::squares(1), steps, gain };
     let fitted = fit(point, &record, &options, "hysteresis", progress)?;
     let channel = &fitted.point.channels[0];
     let z = channel.envelope(0.0, u[0]);
