@@ -23,6 +23,7 @@ use crate::linear::NormalEquations;
 use crate::optimize::LeastSquares;
 use crate::uncertainty::covariance::{Uncertainty, descending_eigen};
 use crate::uncertainty::noise_model::NoiseModel;
+use crate::uncertainty::settings::UncertaintySettings;
 use crate::{Error, Matrix, Record};
 
 /// The uncertainty of a fit that left these residuals.
@@ -35,6 +36,8 @@ pub(crate) fn uncertainty(
     residuals: Vec<Matrix>,
     check: &mut dyn FnMut() -> Result<(), Error>,
 ) -> Result<Uncertainty, Error> {
+    let settings = UncertaintySettings::default();
+    settings.validate()?;
     let Fitted { point, linearization, .. } = fitted;
     let problem = Estimation::new(point, record, options.freedom, &options.loss);
     let curvature = options.loss.curvature(scored(&residuals, record));
@@ -47,7 +50,7 @@ pub(crate) fn uncertainty(
     let free = problem.bounds(point).free();
     let samples = (record.scored() * record.outputs().len()) as f64;
     let gram = &linearization.gram * curvature;
-    Ok(Uncertainty::new(&gram, &scores, &free, samples, linearization.cost))
+    Ok(Uncertainty::new(settings.covariance, &gram, &scores, &free, samples, linearization.cost))
 }
 
 /// The Gram matrix of the sensitivities filtered by 1 / a(q), weighted with the innovations' covariance.

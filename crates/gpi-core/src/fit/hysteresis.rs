@@ -117,7 +117,9 @@ pub fn fit_hysteresis(
         identity: false,
         dynamics: DynamicsFreedom::Nothing,
     };
-    let HysteresisSettings { steps, gain } = HysteresisSettings::default();
+    let settings = HysteresisSettings::default();
+    settings.validate()?;
+    let HysteresisSettings { steps, gain } = settings;
     let options = FitOptions { freedom, loss: Loss::squares(1), steps, gain };
     let fitted = fit(point, &record, &options, "hysteresis", progress)?;
     let channel = &fitted.point.channels[0];

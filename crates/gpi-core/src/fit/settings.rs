@@ -17,6 +17,10 @@ pub(crate) struct FitSettings {
     pub simplification: SimplificationSettings,
     /// The fit of the initial state alone.
     pub initial_state: InitialStateSettings,
+    /// When parts of a few experiments give the curvature of all; a fit uses the defaults.
+    pub representatives: RepresentativeSettings,
+    /// How long the memory of a stage's dynamics may be; a search uses the defaults.
+    pub memory: MemorySettings,
 }
 
 impl FitSettings {
@@ -30,7 +34,9 @@ impl FitSettings {
             return Err(Error::parameter("fewest_steps", fewest_steps, requirement));
         }
         self.simplification.validate()?;
-        self.initial_state.validate()
+        self.initial_state.validate()?;
+        self.representatives.validate()?;
+        self.memory.validate()
     }
 }
 
@@ -140,8 +146,6 @@ mod tests {
     fn usual_settings_are_valid() {
         FitSettings::default().validate().unwrap();
         HysteresisSettings::default().validate().unwrap();
-        RepresentativeSettings::default().validate().unwrap();
-        MemorySettings::default().validate().unwrap();
     }
 
     #[test]

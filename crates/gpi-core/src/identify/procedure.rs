@@ -1,4 +1,16 @@
-//! The whole chain: excitation, start, rounds, model.
+//! The steps of an identification: excitation, start values, structures, model.
+//!
+//! 1. The order of persistent excitation is the largest m for which the Gram matrix of m lagged inputs (m times inputs,
+//!    square) is regular. With m <= 4 the record supports a gain and a delay only; `quasi_static` then fits the hysteresis
+//!    before each delay.
+//! 2. Otherwise `alternation` estimates G as a FIR of up to m taps (samples >= 4 taps times inputs), realizes it by
+//!    Ho and Kalman's method (ERA), fits the hysteresis before it, and repeats this with v in place of u.
+//! 3. `structure` refines candidates jointly, from many plays and deadzones to few, then orders of G, each from the best
+//!    one so far; `criterion` compares them by a BIC for autocorrelated residuals.
+//! 4. The best one is simplified, and its uncertainty is computed.
+//!
+//! Source of 1 to 2: K. F. Aljanaideh et al., whose chain starts with u -> y and inverts G to see v; here v is the
+//! hysteresis' own output, so that no noise is run through an inverse.
 
 use crate::chain::bounds::range;
 use crate::chain::hysteresis::Parameters;
