@@ -1,4 +1,9 @@
 //! Falling pieces of the envelope between neighbouring samples of u are replaced by straight rising ones.
+//!
+//! The envelope `D(u) = u + sum_j g_j Z_eta_j(u)` is linear between thresholds, and the model has an inverse only where
+//! it rises. Between two neighbouring samples a < b of a record, only D(a) and D(b) and the slopes outside are measured.
+//! Where D falls in between although `D(b) > D(a)`, the thresholds inside are replaced by a at the left and b at the
+//! right with the slope `(D(b) - D(a)) / (b - a)`: no simulated sample changes, and D rises.
 
 use crate::chain::hysteresis::Parameters;
 use crate::fit::joint::Refined;

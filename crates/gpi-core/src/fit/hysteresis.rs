@@ -1,4 +1,8 @@
-//! The hysteresis fitted behind given dynamics.
+//! The hysteresis fitted to a given intermediate signal v, without dynamics.
+//!
+//! `v = F(D(u)) + offset` is linear in the weights of the plays F, but a scale can move between F and D; the identity
+//! in D has the weight 1, which fixes it. A play of half-width r does not depend on its initial state from the first
+//! sample at which z has spanned 2 r, since its output has then touched z - r and z + r.
 
 use crate::Progress;
 use crate::chain::bounds::range;

@@ -39,14 +39,14 @@ pub fn residuals_from_fitted_start(
     options.freedom.dynamics = DynamicsFreedom::Nothing;
     let mut best: Option<Fitted> = None;
     for side in own.places {
-        let mut beside = point.clone();
-        beside
+        let mut placed = point.clone();
+        placed
             .pasts
             .iter_mut()
             .filter_map(|past| past.plays.as_mut())
             .flatten()
             .for_each(|plays| plays.fill(side));
-        let fitted = fit(beside, &prepared.record, &options, "start", progress)?;
+        let fitted = fit(placed, &prepared.record, &options, "start", progress)?;
         let cost = fitted.linearization.cost;
         if best.as_ref().is_none_or(|best| cost < best.linearization.cost) {
             best = Some(fitted);

@@ -4,7 +4,7 @@
 //! `min sum_k |W (y(k) - y_hat(k; theta))|^2`, by Levenberg and Marquardt's method with exact sensitivities
 //! (L. Ljung, System Identification, 1999, sections 3.4 and 10.2). Products of gains along the chain would not be
 //! identifiable, so each has one home: G keeps its DC gain, the identity's weight in the envelope is held, and the
-//! widest half-width fixes the scale of z. The steps are those of the files beside this one: prepare the record
+//! widest half-width fixes the scale of z. The steps have files of their own: prepare the record
 //! (`preparation`), fit (`joint`), simplify and report (`finish`).
 
 use crate::chain::hysteresis::Parameters;

@@ -72,7 +72,7 @@ pub struct Identification {
     pub candidates: Vec<Candidate>,
     /// Which of them was chosen.
     pub chosen: usize,
-    /// The paper's first stage, u to y; `None` where the input excites no more than gain and delay.
+    /// The paper's first stage, u to y; `None` where the input allows no more than a gain and a delay.
     pub fir: Option<Fir>,
     /// Singular values of ERA's Hankel matrix in the best round.
     pub singular_values: Vec<f64>,

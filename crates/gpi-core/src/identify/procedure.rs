@@ -33,7 +33,7 @@ use crate::{Error, Record};
 /// criterion prefers, and the rounds go on until nothing is gained.
 ///
 /// # Errors
-/// A constant input or output, more taps than the input excites or the samples allow, parameters out
+/// A constant input or output, more taps than the order of persistent excitation or the samples allow, parameters out
 /// of range, [`Error::Interrupted`] when `progress` returned false.
 pub fn identify(
     record: &Record,
