@@ -60,7 +60,7 @@ impl Point {
         let mut now: Vec<f64> = v.row(0).iter().copied().collect();
         motion.stand(&now);
         for k in 0..v.nrows() {
-            if k == experiment.warmup && past.moving {
+            if k == experiment.warmup && past.has_unknown_state {
                 motion.state.iter_mut().zip(past.state.iter()).for_each(|(x, own)| *x += own);
             }
             let at = k.saturating_sub(self.dynamics.delay);

@@ -15,7 +15,7 @@ pub(crate) struct Past {
     /// the actuator came from rest.
     pub plays: Option<Vec<Vec<f64>>>,
     /// Whether the initial state is unknown, so that `state` is to be fitted.
-    pub moving: bool,
+    pub has_unknown_state: bool,
     /// By how much the state of all [`Point::sections`] at the first scored sample differs from the steady
     /// state before the record.
     pub state: DVector<f64>,

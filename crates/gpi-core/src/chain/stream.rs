@@ -172,7 +172,7 @@ impl<'a> Stream<'a> {
             slopes: Vec::new(),
             scored,
         };
-        let Past { state, moving, .. } = &self.point.pasts[self.index];
+        let Past { state, has_unknown_state, .. } = &self.point.pasts[self.index];
         let mut scored = trace.scored.iter().enumerate().peekable();
         let mut v = vec![0.0; self.sensitivities.len()];
         for (place, k) in trace.samples.clone().enumerate() {
@@ -193,7 +193,7 @@ impl<'a> Stream<'a> {
             if k == 0 {
                 self.motion.stand(&v);
             }
-            if k == self.experiment.warmup && *moving {
+            if k == self.experiment.warmup && *has_unknown_state {
                 self.motion.state.iter_mut().zip(state.iter()).for_each(|(x, own)| *x += own);
             }
             self.motion.observe(&v);

@@ -30,14 +30,14 @@ mod residual;
 mod revision;
 mod score;
 mod search;
-mod settings;
 mod setup;
 mod state;
 mod trial;
 mod verdict;
 
+use crate::fit::RefineOptions;
+use crate::fit::joint::{Refined, fit_options};
 use crate::fit::preparation::starts_at_rest;
-use crate::fit::refine::{RefineOptions, Refined, settings};
 use crate::identify::procedure::{compare, prepare};
 use crate::identify::{Grid, IdentifyOptions, Progress, Refinement};
 use crate::spectrum::is_one_sine;
@@ -192,7 +192,7 @@ fn finish(
     let setup = state.setup;
     let FitPolicy { last_free_steps, last_held_steps, coarser, .. } = setup.policy.fits;
     let stage = |options: &RefineOptions, steps: usize| {
-        let mut own = settings(&state.prepared, options, steps);
+        let mut own = fit_options(&state.prepared, options, steps);
         own.loss.scales.clone_from(&setup.options.loss.scales);
         own
     };

@@ -3,9 +3,9 @@
 use super::policy::ResonancePolicy;
 use crate::Progress;
 use crate::chain::point::Point;
+use crate::fit::joint::Refined;
 use crate::fit::minimize::{FitOptions, fit};
 use crate::fit::preparation::Prepared;
-use crate::fit::refine::Refined;
 use crate::fit::representatives::Representatives;
 use crate::linear::Section;
 use crate::{Error, Experiment, Record};

@@ -3,8 +3,8 @@
 //! "By hand" means that nobody derived the value: it was chosen on simulated stages, and docs/scoreboard.md
 //! shows what all values together achieve. "Squares" are weighted sums of squared residuals.
 
-use super::settings::{FROM_ONE, PART, POSITIVE, settings};
 use crate::Error;
+use crate::settings::{FROM_ONE, PART, POSITIVE, settings};
 
 /// How [`explain`](super::explain) searches.
 #[derive(Clone, Debug, Default, PartialEq)]

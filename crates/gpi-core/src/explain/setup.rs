@@ -5,9 +5,10 @@ use super::policy::SearchPolicy;
 use crate::chain::point::Point;
 use crate::chain::table::Table;
 use crate::effects::{CATALOGUE, Entry};
+use crate::fit::RefineOptions;
+use crate::fit::joint::fit_options;
 use crate::fit::minimize::FitOptions;
 use crate::fit::preparation::Prepared;
-use crate::fit::refine::{RefineOptions, settings};
 use crate::fit::representatives::representatives;
 use crate::spectrum::is_one_sine;
 use crate::{Error, Record};
@@ -46,7 +47,7 @@ impl SearchSetup {
         policy: SearchPolicy,
     ) -> Result<Self, Error> {
         let options = |free: &RefineOptions, gain: f64| {
-            let mut options = settings(prepared, free, policy.fits.steps);
+            let mut options = fit_options(prepared, free, policy.fits.steps);
             options.loss.scales = weights.to_vec();
             FitOptions { gain, ..options }
         };

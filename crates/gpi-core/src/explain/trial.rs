@@ -10,8 +10,8 @@ use crate::Error;
 use crate::Progress;
 use crate::chain::point::Point;
 use crate::effects::{ClosedLoops, Entry, Stage};
+use crate::fit::joint::Refined;
 use crate::fit::minimize::{FitOptions, Fitted};
-use crate::fit::refine::Refined;
 use crate::optimize::Status;
 
 /// Fits candidates; where fits take long, only those that may come near the best so far.
@@ -131,7 +131,7 @@ pub(super) fn measured(
 /// Whether it is the input that makes the lags beside G explain what they do: those whose initial state is unknown
 /// also decay from it, and that is a function of time.
 fn is_driven(state: &SearchState, without: &Point, with: &Point) -> Result<bool, Error> {
-    let moves = with.pasts.iter().any(|past| past.moving);
+    let moves = with.pasts.iter().any(|past| past.has_unknown_state);
     if !moves || with.order() == with.dynamics.order() {
         return Ok(true);
     }

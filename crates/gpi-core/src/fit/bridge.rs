@@ -1,8 +1,13 @@
-//! Where the record shows nothing of the envelope, it does not fall.
+//! Falling pieces of the envelope between neighbouring samples of u are replaced by straight rising ones.
+//!
+//! The envelope `D(u) = u + sum_j g_j Z_eta_j(u)` is linear between thresholds, and the model has an inverse only where
+//! it rises. Between two neighbouring samples a < b of a record, only D(a) and D(b) and the slopes outside are measured.
+//! Where D falls in between although `D(b) > D(a)`, the thresholds inside are replaced by a at the left and b at the
+//! right with the slope `(D(b) - D(a)) / (b - a)`: no simulated sample changes, and D rises.
 
 use crate::chain::hysteresis::Parameters;
+use crate::fit::joint::Refined;
 use crate::fit::preparation::Prepared;
-use crate::fit::refine::Refined;
 use crate::operators::Reading;
 use crate::progress::{Progress, report};
 use crate::{Error, Record};
@@ -11,8 +16,6 @@ impl Refined {
     /// Makes envelopes straight between neighbouring samples of u where they would fall on the way: what is
     /// measured stays as it is, and an inverse exists.
     pub(crate) fn bridge(&mut self, prepared: &Prepared, progress: Progress) -> Result<(), Error> {
-        /// By how much rounding may raise the cost.
-        const ROUNDING: f64 = 1e-6;
         if !self.options.freedom.derivatives.thresholds {
             return Ok(());
         }
@@ -27,7 +30,8 @@ impl Refined {
         let mut check = || report(progress, "refinement", 1.0);
         let same = self.fitted.at(point, &prepared.record, &self.options, &mut check)?;
         // effects before the hysteresis may take u where no sample of the record is
-        if same.linearization.cost <= (1.0 + ROUNDING) * self.fitted.linearization.cost {
+        let allowed = 1.0 + prepared.settings.simplification.rounding;
+        if same.linearization.cost <= allowed * self.fitted.linearization.cost {
             self.fitted = same;
         }
         Ok(())

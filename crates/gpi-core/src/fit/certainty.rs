@@ -1,4 +1,17 @@
-//! How sure a fit is, under the residual's own autocorrelation.
+//! The uncertainty of a fit, under the residual's own autocorrelation.
+//!
+//! With weighted residuals `e_o(k)`, sensitivities `psi_o(k)` (unknowns) and `H = sum psi psi'` (unknowns, unknowns), an
+//! estimate near the truth differs from it by `H^-1 sum psi e`. Its covariance is thus `H^-1 M H^-1`, with the score's
+//! covariance `M = J' R J`, J all rows psi' and R the autocovariance matrix of e (L. Ljung, System Identification, 1999,
+//! section 9.2). R is not formed (samples times samples): each output's residual is modelled as an autoregression,
+//!
+//! ```text
+//! a_o(q) e_o(k) = w_o(k),   a_o(q) = 1 - a_o1 q^-1 - .. - a_op q^-p,   cov w = S S' (outputs, outputs)
+//! ```
+//!
+//! so that `R = A^-1 S S' A^-T`, A the Toeplitz matrix of the a_o, and `M` is the Gram matrix of the rows
+//! `S' A^-T psi`: the sensitivities filtered by the noise model and mixed by S. On a stationary record it does not matter
+//! whether they are filtered forwards or backwards in time.
 
 use super::gather::gather;
 use super::minimize::{FitOptions, Fitted};
@@ -10,12 +23,12 @@ use crate::linear::NormalEquations;
 use crate::optimize::LeastSquares;
 use crate::uncertainty::covariance::{Uncertainty, descending_eigen};
 use crate::uncertainty::noise_model::NoiseModel;
+use crate::uncertainty::settings::UncertaintySettings;
 use crate::{Error, Matrix, Record};
 
 /// The uncertainty of a fit that left these residuals.
 ///
-/// The noise is modelled as an autoregression `a(q) e = w` of the residual. With R its autocovariance matrix, the
-/// score's covariance `J' R J` is the Gram matrix of the sensitivities filtered by 1 / a(q).
+/// Where Huber's loss was used, H is scaled by the loss' mean second derivative over its mean weight.
 pub(crate) fn uncertainty(
     fitted: &Fitted,
     record: &Record,
@@ -23,6 +36,8 @@ pub(crate) fn uncertainty(
     residuals: Vec<Matrix>,
     check: &mut dyn FnMut() -> Result<(), Error>,
 ) -> Result<Uncertainty, Error> {
+    let settings = UncertaintySettings::default();
+    settings.validate()?;
     let Fitted { point, linearization, .. } = fitted;
     let problem = Estimation::new(point, record, options.freedom, &options.loss);
     let curvature = options.loss.curvature(scored(&residuals, record));
@@ -35,7 +50,7 @@ pub(crate) fn uncertainty(
     let free = problem.bounds(point).free();
     let samples = (record.scored() * record.outputs().len()) as f64;
     let gram = &linearization.gram * curvature;
-    Ok(Uncertainty::new(&gram, &scores, &free, samples, linearization.cost))
+    Ok(Uncertainty::new(settings.covariance, &gram, &scores, &free, samples, linearization.cost))
 }
 
 /// The Gram matrix of the sensitivities filtered by 1 / a(q), weighted with the innovations' covariance.

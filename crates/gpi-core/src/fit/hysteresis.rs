@@ -1,4 +1,8 @@
-//! The hysteresis fitted behind given dynamics.
+//! The hysteresis fitted to a given intermediate signal v, without dynamics.
+//!
+//! `v = F(D(u)) + offset` is linear in the weights of the plays F, but a scale can move between F and D; the identity
+//! in D has the weight 1, which fixes it. A play of half-width r does not depend on its initial state from the first
+//! sample at which z has spanned 2 r, since its output has then touched z - r and z + r.
 
 use crate::Progress;
 use crate::chain::bounds::range;
@@ -7,10 +11,10 @@ use crate::chain::point::{DynamicsFreedom, Freedom, Past, Point};
 use crate::chain::sensitivity::Derivatives;
 use crate::fit::Grid;
 use crate::fit::minimize::{FitOptions, fit};
+use crate::fit::settings::HysteresisSettings;
 use crate::linear::Sections;
 use crate::operators::Reading;
-use crate::optimize::Loss;
-use crate::optimize::Status;
+use crate::optimize::{Loss, Status};
 use crate::{Channel, Error, Experiment, Hysteresis, Matrix, Record};
 use nalgebra::DVector;
 
@@ -108,7 +112,7 @@ pub fn fit_hysteresis(
         dynamics: Sections::delayed_gain(&Matrix::from_element(1, 1, 1.0), 0),
         effects: Vec::new(),
         rate: 1.0,
-        pasts: vec![Past { plays, moving: true, state: DVector::zeros(0) }],
+        pasts: vec![Past { plays, has_unknown_state: true, state: DVector::zeros(0) }],
         offsets: vec![Matrix::from_element(1, 1, experiment.output.mean())],
     };
     let freedom = Freedom {
@@ -117,7 +121,10 @@ pub fn fit_hysteresis(
         identity: false,
         dynamics: DynamicsFreedom::Nothing,
     };
-    let options = FitOptions { freedom, loss: Loss::squares(1), steps: 60, gain: 1e-4 };
+    let settings = HysteresisSettings::default();
+    settings.validate()?;
+    let HysteresisSettings { steps, gain } = settings;
+    let options = FitOptions { freedom, loss: Loss::squares(1), steps, gain };
     let fitted = fit(point, &record, &options, "hysteresis", progress)?;
     let channel = &fitted.point.channels[0];
     let z = channel.envelope(0.0, u[0]);

@@ -1,19 +1,20 @@
-//! The state that a record starts from, fitted with the model kept.
+//! The initial state of a record, fitted with the model kept.
 
 use crate::Progress;
 use crate::chain::hysteresis::Parameters;
 use crate::chain::point::DynamicsFreedom;
+use crate::fit::joint::fit_options;
 use crate::fit::minimize::{Fitted, fit};
-use crate::fit::preparation::Prepared;
-use crate::fit::refine::{RefineOptions, require_match, settings};
+use crate::fit::preparation::{Prepared, require_match};
+use crate::fit::refinement::RefineOptions;
 use crate::{Error, Matrix, Model, Record};
 
-/// Measured minus simulated outputs of each experiment, (samples, outputs), where the start of
-/// experiments that begin in motion is fitted to the record and the model is kept.
+/// Measured minus simulated outputs of each experiment, (samples, outputs), where an
+/// unknown initial state is fitted to the record and the model is kept.
 ///
-/// Only what happened before the record is estimated: the place of every play beside z(0), and the
-/// state of G; an experiment that begins at rest, or has a warm-up, is simulated as it is. This is
-/// what MATLAB's `compare` does with the initial state.
+/// Only the initial state is estimated: the place of every play between z(0) - r and z(0) + r, and the state of G. An
+/// experiment that begins at rest, or has a warm-up, is simulated as it is. MATLAB's `compare` estimates the initial
+/// state in the same way.
 ///
 /// # Errors
 /// Channels or rates that differ, [`Error::Interrupted`] when `progress` returned false.
@@ -22,7 +23,6 @@ pub fn residuals_from_fitted_start(
     record: &Record,
     progress: Progress,
 ) -> Result<Vec<Matrix>, Error> {
-    const STEPS: usize = 60;
     require_match(model, record)?;
     let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
     let prepared = Prepared::scoring_all(record, channels)?;
@@ -32,21 +32,21 @@ pub fn residuals_from_fitted_start(
             column.fill(model.offsets()[output] - prepared.means[output]);
         }
     }
-    let mut options = settings(&prepared, &RefineOptions::default(), STEPS);
+    let own = &prepared.settings.initial_state;
+    let mut options = fit_options(&prepared, &RefineOptions::default(), own.steps);
     options.freedom.weights = false;
     options.freedom.identity = false;
     options.freedom.dynamics = DynamicsFreedom::Nothing;
-    // The cost has a minimum wherever another set of plays turns at the first peaks.
     let mut best: Option<Fitted> = None;
-    for side in [0.0, -0.5, 0.5] {
-        let mut beside = point.clone();
-        beside
+    for side in own.places {
+        let mut placed = point.clone();
+        placed
             .pasts
             .iter_mut()
             .filter_map(|past| past.plays.as_mut())
             .flatten()
             .for_each(|plays| plays.fill(side));
-        let fitted = fit(beside, &prepared.record, &options, "start", progress)?;
+        let fitted = fit(placed, &prepared.record, &options, "start", progress)?;
         let cost = fitted.linearization.cost;
         if best.as_ref().is_none_or(|best| cost < best.linearization.cost) {
             best = Some(fitted);
@@ -57,7 +57,7 @@ pub fn residuals_from_fitted_start(
     // what is known needs no fit
     let as_it_is = model.residuals(record)?;
     let choose = |(index, (fitted, known))| {
-        if prepared.moving[index] { fitted } else { known }
+        if prepared.has_unknown_state[index] { fitted } else { known }
     };
     Ok(with_start.into_iter().zip(as_it_is).enumerate().map(choose).collect())
 }

@@ -1,36 +1,37 @@
-//! How long G may remember, where what is slower has a name of its own.
+//! Poles of G that are too slow for a mechanical stage: creep and disturbances have effects of their own.
 
 use crate::chain::point::Point;
 use crate::effects::longest_lag;
 use crate::fit::preparation::rescale;
+use crate::fit::settings::MemorySettings;
 use crate::linear::Sections;
 use crate::{Error, Record};
 use nalgebra::Complex;
 
-/// The longest memory of a mechanical stage's dynamics, in samples.
+/// The longest time constants of a mechanical stage's dynamics, in samples.
 pub(crate) struct Memory {
+    /// Of real poles: a slower one is creep.
     lag: f64,
-    swing: f64,
+    /// Of all poles: a slower one is a disturbance.
+    longest: f64,
 }
 
 impl Memory {
     pub(crate) fn of(record: &Record) -> Self {
-        /// Of the longest experiment.
-        const PART: f64 = 0.05;
         let samples = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
-        let swing = PART * samples as f64;
-        Self { lag: longest_lag(record.rate()), swing }
+        let longest = MemorySettings::default().part * samples as f64;
+        Self { lag: longest_lag(record.rate()), longest }
     }
 
-    /// Whether a pole follows creep.
+    /// Whether a pole is a lag as slow as creep, whose time constant `-1 / ln(pole)` exceeds that of the dynamics.
     pub(crate) fn is_slow_lag(&self, pole: &Complex<f64>) -> bool {
         pole.im == 0.0 && pole.re > 0.0 && -1.0 / pole.re.ln() > self.lag
     }
 
-    /// Whether a pole follows creep or a disturbance.
+    /// Whether a pole is as slow as creep or a disturbance, `-1 / ln|pole|` its time constant.
     pub(crate) fn is_exceeded_by(&self, pole: &Complex<f64>) -> bool {
         let memory = -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln();
-        memory >= self.swing || self.is_slow_lag(pole)
+        memory >= self.longest || self.is_slow_lag(pole)
     }
 }
 

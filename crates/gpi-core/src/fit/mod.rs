@@ -1,23 +1,28 @@
-//! The estimation problem: what is fitted to a record, from where, and how.
+//! Fits of a model to a record: preparation, the least squares problem, the joint fit, and its uncertainty.
 
 mod bridge;
 mod certainty;
+mod finish;
 pub(crate) mod gather;
 mod grid;
 pub(crate) mod hysteresis;
 mod initial_state;
+pub(crate) mod joint;
 pub(crate) mod memory;
 pub(crate) mod minimize;
 mod model_sections;
 pub(crate) mod preparation;
 pub(crate) mod problem;
-pub(crate) mod refine;
+mod refine;
+mod refinement;
 pub(crate) mod representatives;
 mod sensitivities;
+mod settings;
 
 pub use crate::optimize::Status;
 pub use grid::Grid;
 pub use hysteresis::{HysteresisFit, fit_hysteresis};
 pub use initial_state::residuals_from_fitted_start;
-pub use refine::{Parameter, RefineOptions, Refinement, refine};
+pub use refine::refine;
+pub use refinement::{Parameter, RefineOptions, Refinement};
 pub use sensitivities::{Sensitivities, sensitivities};

@@ -1,4 +1,8 @@
 //! The dynamics of a model as sections, with the loops around them in the same coordinates.
+//!
+//! A loop adds `e_l f(s_l x)` to the next state of G. With E (order, loops) the vectors e_l and S (loops, order) the rows
+//! s_l, the system `(A, [B E], [C; S], D)` has the loops as further inputs and outputs; its sections in parallel contain E
+//! and S in the new coordinates.
 
 use crate::effects::{ClosedLoops, Effect, InnerLoop, PlaceMut, Sees};
 use crate::linear::{Sections, StateSpace};

@@ -1,4 +1,13 @@
-//! What every fit starts from: the past of each experiment, and outputs without their means.
+//! What every fit starts from: the initial state of each experiment, and outputs without their means.
+//!
+//! A play of half-width r holds its output within `z(k) - r <= F(k) <= z(k) + r`. From the first sample k* at which
+//! `max z - min z >= 2 r`, its output no longer depends on F(-1), because it has touched both bounds. Where the
+//! inputs are zero at first, the actuator starts at rest and the initial state is known. Elsewhere it is unknown:
+//!
+//! - If all plays lose it early (k* is at most a tenth of the experiment), the samples before k* are not scored.
+//! - Otherwise `F(-1) = z(0) + s r` with `-1 <= s <= 1` is fitted, one s for each play.
+//!
+//! In both cases the state of G (one vector for each experiment, as long as the order) is fitted as well.
 
 use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{Past, Point};
@@ -6,6 +15,7 @@ use crate::effects::{PlaceMut, Sees};
 use crate::fit::Grid;
 use crate::fit::hysteresis::forgets_at;
 use crate::fit::model_sections::sections_of;
+use crate::fit::settings::{FitSettings, PreparationSettings};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::DVector;
@@ -13,47 +23,51 @@ use nalgebra::DVector;
 /// A record made ready, and hysteresis parameters to start from.
 pub(crate) struct Prepared<'a> {
     pub given: &'a Record,
-    /// The record without the samples that the plays' unknown past disturbs, and without the mean
-    /// of each output.
+    /// The record without the samples that the plays' unknown initial state disturbs, and without the
+    /// mean of each output.
     pub record: Record,
     pub means: Vec<f64>,
-    /// Of each experiment: whether the start of its plays is to be fitted.
-    pub unknown_past: Vec<bool>,
-    /// Of each experiment: whether it began in motion, so that the state of G is to be fitted.
-    pub moving: Vec<bool>,
+    /// Of each experiment: whether the initial state of its plays is to be fitted.
+    pub has_unknown_plays: Vec<bool>,
+    /// Of each experiment: whether its initial state is unknown, so that the state of G is to be fitted.
+    pub has_unknown_state: Vec<bool>,
     pub channels: Vec<Parameters>,
     pub notes: Vec<String>,
+    pub settings: FitSettings,
 }
 
 impl<'a> Prepared<'a> {
-    /// Finds out which past is known. Samples in which the plays forget an unknown past are left out
-    /// of the score where they are few.
+    /// Finds out which initial states are known. Samples that depend on an unknown initial state of the plays are left
+    /// out of the score where they are few.
     pub(crate) fn new(given: &'a Record, channels: Vec<Parameters>) -> Result<Self, Error> {
-        Self::with_forgetting(given, channels, 0.1)
+        Self::with_settings(given, channels, FitSettings::default())
     }
 
-    /// The same with all starts in motion to be fitted, and all samples scored.
+    /// The same with all unknown initial states to be fitted, and all samples scored.
     pub(crate) fn scoring_all(given: &'a Record, channels: Vec<Parameters>) -> Result<Self, Error> {
-        Self::with_forgetting(given, channels, 0.0)
+        let mut settings = FitSettings::default();
+        settings.preparation.forgetting = 0.0;
+        Self::with_settings(given, channels, settings)
     }
 
-    /// `fraction` of an experiment may be left out.
-    fn with_forgetting(
+    fn with_settings(
         given: &'a Record,
         channels: Vec<Parameters>,
-        fraction: f64,
+        settings: FitSettings,
     ) -> Result<Self, Error> {
+        settings.validate()?;
+        let fraction = settings.preparation.forgetting;
         let mut notes = Vec::new();
         let mut experiments = given.experiments().to_vec();
-        let mut unknown_past = vec![false; experiments.len()];
-        let mut moving = vec![false; experiments.len()];
+        let mut has_unknown_plays = vec![false; experiments.len()];
+        let mut has_unknown_state = vec![false; experiments.len()];
         for (index, experiment) in experiments.iter_mut().enumerate() {
-            // A warm-up is there to hide the past, but where plays stick it never ends.
+            // A warm-up ends the effect of the initial state, but not where plays are wider than the input's range.
             let is_hidden = experiment.warmup > 0 && fraction > 0.0;
             if starts_at_rest(experiment) || is_hidden {
                 continue;
             }
-            moving[index] = true;
+            has_unknown_state[index] = true;
             let mut forgets = channels.iter().enumerate().map(|(input, channel)| {
                 let widest = channel.half_widths.iter().copied().fold(0.0, f64::max);
                 let mut previous = 0.0;
@@ -67,15 +81,15 @@ impl<'a> Prepared<'a> {
                     experiment.warmup = at;
                     experiment.held_out.retain(|held| held.start >= at);
                     notes.push(format!(
-                        "experiment {index} starts in motion: its first {at} samples, in which the \
-                         plays forget their past, are not scored"
+                        "experiment {index} has an unknown initial state: its first {at} samples, in which \
+                         the plays depend on it, are not scored"
                     ));
                 }
                 _ => {
-                    unknown_past[index] = true;
+                    has_unknown_plays[index] = true;
                     notes.push(format!(
-                        "experiment {index} starts in motion and forgets its past late: the plays' \
-                         start is fitted"
+                        "experiment {index} has an unknown initial state, and the plays depend on it for \
+                         long: their initial state is fitted"
                     ));
                 }
             }
@@ -89,14 +103,27 @@ impl<'a> Prepared<'a> {
             }
         }
         let record = given.with_experiments(experiments)?;
-        Ok(Self { given, record, means, unknown_past, moving, channels, notes })
+        Ok(Self {
+            given,
+            record,
+            means,
+            has_unknown_plays,
+            has_unknown_state,
+            channels,
+            notes,
+            settings,
+        })
     }
 
     /// The prepared hysteresis before given dynamics.
     pub(crate) fn point(&self, dynamics: Sections) -> Point {
         let state = DVector::zeros(dynamics.order());
-        let past = |&moving: &bool| Past { plays: None, moving, state: state.clone() };
-        let pasts: Vec<Past> = self.moving.iter().map(past).collect();
+        let past = |&has_unknown_state: &bool| Past {
+            plays: None,
+            has_unknown_state,
+            state: state.clone(),
+        };
+        let pasts: Vec<Past> = self.has_unknown_state.iter().map(past).collect();
         let offsets = vec![Matrix::zeros(1, self.means.len()); pasts.len()];
         let channels = self.channels.clone();
         let (effects, rate) = (Vec::new(), self.record.rate());
@@ -138,10 +165,10 @@ impl<'a> Prepared<'a> {
         point.channels.iter().enumerate().map(span).collect()
     }
 
-    /// Starts the plays anew: from rest, or where the past is unknown at z.
+    /// Sets the initial state of the plays: at rest, or at z where it is unknown.
     pub(crate) fn settle(&self, point: &mut Point) {
         let at_z = || point.channels.iter().map(|c| vec![0.0; c.half_widths.len()]).collect();
-        for (past, &unknown) in point.pasts.iter_mut().zip(&self.unknown_past) {
+        for (past, &unknown) in point.pasts.iter_mut().zip(&self.has_unknown_plays) {
             past.plays = unknown.then(at_z);
         }
     }
@@ -161,7 +188,7 @@ impl<'a> Prepared<'a> {
         self.record.with_experiments(experiments.collect())
     }
 
-    /// Runs the model free over the training data: root mean square of what is left. The point's
+    /// Runs the model free over the training data: root mean square residual. The point's
     /// offsets become those that fit best.
     pub(crate) fn free_run(&self, point: &mut Point) -> Result<f64, Error> {
         let mut squares = 0.0;
@@ -184,12 +211,25 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Whether all inputs stand at zero for a while before anything moves.
+/// Refuses a model whose channels or rate are not those of a record.
+pub(crate) fn require_match(model: &Model, record: &Record) -> Result<(), Error> {
+    let inputs = (("model", model.inputs().len()), ("record", record.inputs().len()));
+    let outputs = (("model", model.outputs().len()), ("record", record.outputs().len()));
+    Error::require_equal("inputs", inputs.0, inputs.1)?;
+    Error::require_equal("outputs", outputs.0, outputs.1)?;
+    if (model.rate() / record.rate() - 1.0).abs() > 1e-6 {
+        let requirement = format!("the model runs at {} Hz; resample the record", model.rate());
+        return Err(Error::parameter("rate", record.rate(), requirement));
+    }
+    Ok(())
+}
+
+/// Whether all inputs are zero for a while before anything moves.
 pub(crate) fn starts_at_rest(experiment: &Experiment) -> bool {
-    const QUIET: usize = 10;
+    let PreparationSettings { quiet, zero, .. } = PreparationSettings::default();
     let input = &experiment.input;
     let largest = input.amax();
-    input.nrows() > QUIET && input.rows(0, QUIET).amax() <= 1e-9 * largest
+    input.nrows() > quiet && input.rows(0, quiet).amax() <= zero * largest
 }
 
 /// Moves the gain of G into the play weights.

@@ -1,10 +1,24 @@
 //! The estimation of a point on a record, as a least squares problem.
 //!
-//! The residuals are those of the free run, `e = y - y_hat`, of all scored samples and outputs; their derivatives
-//! are streamed through the chain. The memory needed does not grow with samples times unknowns.
+//! The residuals are those of the free run, `e(k) = y(k) - y_hat(k; theta)` (outputs) at all N scored samples k. With
+//! `psi_o(k) = d y_hat_o(k) / d theta` (unknowns) of output o and weights `w_o(k) = s_o^2 min(1, t_o / |e_o(k)|)` of the loss (s
+//! the scale of the output, t the residual at which Huber's loss becomes linear, infinite for least squares):
+//!
+//! ```text
+//! cost    = sum_k,o rho_o(e_o(k))                      rho the loss: s^2 e^2 up to |e| = t
+//! descent = sum_k,o w_o(k) psi_o(k) e_o(k)             (unknowns), minus half the gradient
+//! gram    = sum_k,o w_o(k) psi_o(k) psi_o(k)'          (unknowns, unknowns), half the Gauss-Newton Hessian
+//! ```
+//!
+//! psi is never stored: its rows are streamed through the chain in blocks, each block is added to `gram` and
+//! `descent`, and the memory needed does not grow with N times unknowns. Where the Gram matrix of a whole record would
+//! take long, it comes from a part of it (see [`representatives`]) and the gradient from an adjoint pass, which costs a
+//! few simulations whatever the number of unknowns. Source: J. Nocedal and S. Wright, Numerical Optimization, 2006,
+//! chapter 10; the weights are those of iteratively reweighted least squares.
 
 use super::gather::gather;
 use super::representatives::{representatives, streamed};
+use super::settings::ROUNDING;
 use crate::chain::adjoint::descent;
 use crate::chain::point::{Freedom, Point};
 use crate::chain::stream::{Rows, Stream};
@@ -91,11 +105,10 @@ impl LeastSquares for Estimation<'_> {
 
     /// What rounding leaves of the outputs' squares.
     fn rounding(&self) -> f64 {
-        /// The square of some thousand times the machine's epsilon.
-        const PART: f64 = 1e-25;
         let outputs = self.record.experiments().iter().flat_map(|e| e.output.column_iter());
         let scales = self.loss.scales.iter().cycle();
-        PART * outputs.zip(scales).map(|(y, scale)| scale.powi(2) * y.norm_squared()).sum::<f64>()
+        ROUNDING
+            * outputs.zip(scales).map(|(y, scale)| scale.powi(2) * y.norm_squared()).sum::<f64>()
     }
 }
 
@@ -137,7 +150,7 @@ mod tests {
     #[test]
     fn gradient_is_the_one_that_all_derivatives_give() {
         let model = model();
-        // one with a run-in from rest, and one that begins in motion and holds samples out
+        // one with a run-in from rest, and one of unknown initial state that holds samples out
         let runs = vec![run(1.5, 0.0, 130, vec![]), run(1.5, 0.3, 0, vec![300..420, 500..520])];
         let record = record(&model, runs);
         let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();

@@ -1,7 +1,22 @@
-//! Parts of a few experiments that stand for all where the derivatives of a whole record would take long.
+//! Parts of a few experiments whose Gram matrix replaces that of a whole record, where the latter would take long.
+//!
+//! For n unknowns and N values a Gram matrix takes `N n^2` multiplications, but far fewer values than N determine it well
+//! enough for the direction of a step; only the gradient must be exact, since it decides where the fit ends (R. Byrd,
+//! G. Chin, W. Neveitt and J. Nocedal, On the use of stochastic Hessian information, 2011). Experiments are chosen at
+//! evenly spread ranks of their output's mean square, and of each a part, so that 25 n values remain. With m of N samples
+//! chosen and `J` (m rows, n) their sensitivities,
+//!
+//! ```text
+//! gram = N / m J'J                        for what all experiments share
+//! gram = N_i / m_i J_i'J_i                for the offsets of a chosen experiment i, N_i / N_l that of l for another i
+//! ```
+//!
+//! Derivatives of a part begin `ln(0.01) / ln|p|` samples before it, p the slowest pole: earlier inputs act on it by less
+//! than one percent.
 
 use crate::chain::point::Point;
 use crate::chain::table::{Group, Table};
+use crate::fit::settings::RepresentativeSettings;
 use crate::linear::Section;
 use crate::{Error, Experiment, Matrix, Record};
 
@@ -16,7 +31,7 @@ pub(crate) struct Representatives {
     pub memory: usize,
 }
 
-/// Chooses experiments of evenly spread swings, and of each a part, with enough samples for the curvature of the
+/// Chooses experiments of evenly spread amplitudes (rms), and of each a part, with enough samples for the curvature of the
 /// cost by so many unknowns, where all of them would take long; `None` where they would not, or where each
 /// experiment has unknowns of its own that the others say nothing about.
 ///
@@ -26,33 +41,26 @@ pub(crate) fn representatives(
     record: &Record,
     unknowns: usize,
 ) -> Option<Representatives> {
-    /// Products of a Gram matrix that take long.
-    const LONG: f64 = 1e10;
-    /// Values for each unknown that are enough.
-    const ENOUGH: f64 = 25.0;
-    /// Small, middle and large swings.
-    const FEWEST: f64 = 3.0;
-    /// Part of the record from which on choosing saves too little.
-    const MOST: f64 = 0.5;
+    let RepresentativeSettings { long, enough, fewest, most, decayed } = Default::default();
     let experiments = record.experiments();
     let all = experiments.len() as f64;
     let outputs = record.outputs().len() as f64;
-    let (values, enough) = (record.scored() as f64 * outputs, ENOUGH * unknowns as f64);
-    let has_own = point.pasts.iter().any(|past| past.moving || past.plays.is_some());
-    if values * (unknowns as f64).powi(2) < LONG
-        || enough > MOST * values
-        || all < FEWEST
+    let (values, enough) = (record.scored() as f64 * outputs, enough * unknowns as f64);
+    let has_own = point.pasts.iter().any(|past| past.has_unknown_state || past.plays.is_some());
+    if values * (unknowns as f64).powi(2) < long
+        || enough > most * values
+        || all < fewest
         || has_own
     {
         return None;
     }
-    let count = (all * enough / values).ceil().max(FEWEST);
-    let swing = |experiment: &Experiment| {
+    let count = (all * enough / values).ceil().max(fewest);
+    let power = |experiment: &Experiment| {
         let rows = experiment.scored_rows(&experiment.output).map(|rows| rows.norm_squared());
         rows.sum::<f64>() / experiment.scored() as f64
     };
-    let swings: Vec<f64> = experiments.iter().map(swing).collect();
-    let chosen = spread(&swings, count as usize);
+    let powers: Vec<f64> = experiments.iter().map(power).collect();
+    let chosen = spread(&powers, count as usize);
     let own: usize = chosen.iter().map(|&index| experiments[index].scored()).sum();
     let parts = (own as f64 * outputs / enough).floor().max(1.0) as usize;
     let part =
@@ -65,8 +73,8 @@ pub(crate) fn representatives(
         .flat_map(Section::poles)
         .map(|pole| pole.norm())
         .fold(0.0, f64::max);
-    // to one percent, and no longer than what is scored
-    let memory = (0.01_f64.ln() / slowest.min(1.0 - 1e-9).ln()).ceil().max(0.0);
+    // no longer than what is scored
+    let memory = (decayed.ln() / slowest.min(1.0 - 1e-9).ln()).ceil().max(0.0);
     Some(Representatives {
         ratio: record.scored() as f64 / own as f64,
         memory: (memory as usize).min(own / chosen.len()),
@@ -97,8 +105,7 @@ fn spread(values: &[f64], count: usize) -> Vec<usize> {
 }
 
 impl Representatives {
-    /// Makes a Gram matrix of these parts that of the record: all unknowns but the offsets, which every
-    /// experiment has for itself, have so much more to say.
+    /// Extrapolates the Gram matrix of these parts to the record; every experiment has its own offsets.
     pub(crate) fn extend(&self, gram: &mut Matrix, table: &Table, record: &Record) {
         let scored = |index: usize| record.experiments()[index].scored() as f64;
         let mut factors = vec![self.ratio; table.len];
@@ -175,7 +182,7 @@ mod tests {
         let (expected, table) = gram(&point, &prepared.record);
         let (alone, own) = few.alone(&point, &prepared.record).unwrap();
         let (two, within) = gram(&alone, &own);
-        // offsets of the two stand elsewhere among those of all
+        // the offsets of the two have other places among those of all
         let offsets = |experiment: usize| table.range(Group::Offsets { experiment });
         let shared = within.range(Group::Offsets { experiment: 0 }).start;
         let mut found = Matrix::zeros(table.len, table.len);
@@ -223,9 +230,9 @@ mod tests {
     }
 
     #[test]
-    fn chosen_experiments_spread_over_all_swings() {
-        let swings = [3.0, 1.0, 2.0, 3.1, 1.1, 2.1, 3.2, 1.2, 2.2];
-        assert_eq!(spread(&swings, 3), [3, 4, 5]);
-        assert_eq!(spread(&swings, 9), [0, 1, 2, 3, 4, 5, 6, 7, 8]);
+    fn chosen_experiments_spread_over_all_amplitudes() {
+        let powers = [3.0, 1.0, 2.0, 3.1, 1.1, 2.1, 3.2, 1.2, 2.2];
+        assert_eq!(spread(&powers, 3), [3, 4, 5]);
+        assert_eq!(spread(&powers, 9), [0, 1, 2, 3, 4, 5, 6, 7, 8]);
     }
 }

@@ -1,12 +1,13 @@
-//! The derivatives that a refinement uses, handed out: for experiment design, other optimizers, checks.
+//! The derivatives that a refinement uses, for experiment design, other optimizers and checks.
 
 use crate::chain::hysteresis::Parameters;
 use crate::chain::point::Point;
 use crate::chain::stream::Stream;
 use crate::chain::table::{Group, Table};
-use crate::fit::preparation::Prepared;
+use crate::fit::joint::fit_options;
+use crate::fit::preparation::{Prepared, require_match};
 use crate::fit::problem::Estimation;
-use crate::fit::refine::{RefineOptions, require_match, settings};
+use crate::fit::refinement::RefineOptions;
 use crate::optimize::{LeastSquares, Loss};
 use crate::progress::{Progress, report};
 use crate::{Error, Matrix, Model, Record};
@@ -53,7 +54,7 @@ pub fn sensitivities(
             column.fill(model.offsets()[output] - prepared.means[output]);
         }
     }
-    let freedom = settings(&prepared, options, 1).freedom;
+    let freedom = fit_options(&prepared, options, 1).freedom;
     let table = Table::new(&point, freedom);
     let kept = point.bounds(&table, &prepared.record, freedom).estimated();
     let mut jacobians = Vec::new();

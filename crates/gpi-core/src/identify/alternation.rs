@@ -3,17 +3,16 @@
 use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{DynamicsFreedom, Point};
 use crate::fit::Grid;
+use crate::fit::RefineOptions;
+use crate::fit::joint::fit_options;
 use crate::fit::minimize::fit;
 use crate::fit::preparation::{Prepared, rescale};
-use crate::fit::refine::{RefineOptions, settings};
 use crate::identify::identification::Round;
 use crate::identify::realization::{self, Dynamics};
+use crate::identify::settings::IdentifySettings;
 use crate::linear::{self, Fir};
 use crate::progress::{Progress, report};
 use crate::{Error, Record};
-
-/// Regularization of the FIR estimates, see [`linear::estimate`].
-const RIDGE: f64 = 3e-2;
 
 /// Taps of the FIR estimates.
 #[derive(Clone, Copy, Debug)]
@@ -40,29 +39,26 @@ pub(crate) fn seed(
     half_widths: &Grid,
     taps: &mut Taps,
     order: Option<usize>,
+    settings: &IdentifySettings,
     progress: Progress,
 ) -> Result<Seed, Error> {
-    const ROUNDS: usize = 4;
-    /// Levenberg-Marquardt steps a round.
-    const STEPS: usize = 7;
-    /// A round that lowers the rms by less than this fraction is the last one.
-    const GAIN: f64 = 5e-3;
-    let mut current = dynamics_of(&prepared.record, taps, order, progress)?;
+    let policy = &settings.alternation;
+    let mut current = dynamics_of(&prepared.record, taps, order, settings, progress)?;
     let fir = linear::estimate(&prepared.record.pieces(taps.count)?, taps.count, 0.0)?;
     let mut rounds = Vec::new();
     let mut point = prepared.point(current.sections()?);
     let linear_alone = prepared.free_run(&mut point)?;
-    let mut options = settings(prepared, &RefineOptions::default(), STEPS);
+    let mut options = fit_options(prepared, &RefineOptions::default(), policy.steps);
     options.freedom.identity = false;
     // The weights need not make up for an error of G's zeros.
     options.freedom.dynamics = DynamicsFreedom::Numerator;
-    options.gain = 1e-4;
+    options.gain = policy.gain;
     rescale(&mut point);
     let mut best = (linear_alone, point.clone(), current.clone());
-    for round in 0..ROUNDS {
-        report(progress, "rounds", round as f64 / ROUNDS as f64)?;
+    for round in 0..policy.rounds {
+        report(progress, "rounds", round as f64 / policy.rounds as f64)?;
         if round > 0 {
-            current = dynamics_of(&prepared.driven(&point)?, taps, order, progress)?;
+            current = dynamics_of(&prepared.driven(&point)?, taps, order, settings, progress)?;
             point.replace_dynamics(current.sections()?);
         }
         rescale(&mut point);
@@ -75,16 +71,16 @@ pub(crate) fn seed(
         if rms < least {
             best = (rms, point.clone(), current.clone());
         }
-        let stalled = rms > (1.0 - GAIN) * least;
+        let stalled = rms > (1.0 - policy.small) * least;
         if stalled && round == 0 {
             prepared.notes.push(format!(
-                "hysteresis at the input hardly helps: training error {rms:.4e} with it, \
+                "hysteresis at the input hardly lowers the error: training error {rms:.4e} with it, \
                  {least:.4e} without"
             ));
         }
         let silent = |c: &Parameters| c.weights.iter().all(|&weight| weight == 0.0);
         if stalled || point.channels.iter().any(silent) {
-            // In the latter case y does not follow an input: there is no v to go on from.
+            // In the latter case y does not depend on an input, so that v is zero.
             break;
         }
     }
@@ -102,17 +98,18 @@ pub(crate) fn dynamics_of(
     record: &Record,
     taps: &mut Taps,
     order: Option<usize>,
+    settings: &IdentifySettings,
     progress: Progress,
 ) -> Result<Dynamics, Error> {
     let mut check = || report(progress, "dynamics", 0.0);
     let record = &record.pieces(taps.largest)?;
-    let found = realization::estimate(record, taps.count, RIDGE, order, &mut check)?;
-    // taps until the slowest pole has decayed to one percent
+    let found = realization::estimate(record, taps.count, settings, order, &mut check)?;
+    // taps until the slowest pole has decayed
     let radius = found.refit.system.spectral_radius()?;
-    let needed = (0.01_f64.ln() / radius.ln()) as usize;
-    if needed > taps.count + taps.count / 5 && taps.count < taps.largest {
+    let needed = (settings.taps.decayed.ln() / radius.ln()) as usize;
+    if needed > taps.count + taps.count / settings.taps.tolerance && taps.count < taps.largest {
         taps.count = needed.min(taps.largest);
-        return realization::estimate(record, taps.count, RIDGE, order, &mut check);
+        return realization::estimate(record, taps.count, settings, order, &mut check);
     }
     Ok(found)
 }

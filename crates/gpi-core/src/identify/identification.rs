@@ -2,8 +2,7 @@
 
 use crate::Model;
 use crate::fit::Grid;
-use crate::fit::refine::Refinement;
-use crate::identify::structure::Candidate;
+use crate::fit::Refinement;
 use crate::linear::Fir;
 use crate::operators::Reading;
 
@@ -18,7 +17,7 @@ pub struct IdentifyOptions {
     pub half_widths: Option<Grid>,
     /// Deadzones: how many, placed by the data, or their thresholds in the unit of the input, kept.
     pub thresholds: Option<Grid>,
-    /// How the deadzones are read.
+    /// The deadzone convention.
     pub reading: Reading,
     /// Restricts the linear part to a gain with a delay of this many samples.
     pub delay: Option<usize>,
@@ -28,10 +27,33 @@ pub struct IdentifyOptions {
     pub offset_knots: usize,
 }
 
+/// One structure that was refined and compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Dead time of the linear part, in samples.
+    pub delay: usize,
+    /// Order of the linear part without its dead time.
+    pub order: usize,
+    /// Plays of each input, the linear term included.
+    pub plays: usize,
+    /// Deadzones of each input besides the identity.
+    pub deadzones: usize,
+    /// Root mean square residual on the training data.
+    pub rms: f64,
+    /// Parameters that were estimated.
+    pub parameters: usize,
+    /// The same counted in samples of white noise: the slower the residual of the best fit, the more
+    /// each parameter takes from it (Takeuchi's `tr(H^-1 M) / variance` per parameter).
+    pub used: f64,
+    /// `N ln(rms^2) + used ln N` over N output values: BIC for an autocorrelated residual. The least is
+    /// chosen.
+    pub criterion: f64,
+}
+
 /// One pass of hysteresis and dynamics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Round {
-    /// Root mean square of what is left on the training data, in the output's unit.
+    /// Root mean square residual on the training data, in the output's unit.
     pub rms: f64,
     /// Order of G.
     pub order: usize,
@@ -39,7 +61,7 @@ pub struct Round {
     pub taps: usize,
 }
 
-/// A model and what it rests on.
+/// A model, and the results of the steps that led to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identification {
     /// The refined model.
@@ -50,19 +72,19 @@ pub struct Identification {
     pub candidates: Vec<Candidate>,
     /// Which of them was chosen.
     pub chosen: usize,
-    /// The paper's first stage, u to y; `None` where the input excites no more than gain and delay.
+    /// The paper's first stage, u to y; `None` where the input allows no more than a gain and a delay.
     pub fir: Option<Fir>,
     /// Singular values of ERA's Hankel matrix in the best round.
     pub singular_values: Vec<f64>,
     /// Unstable poles that ERA reflected in the best round.
     pub reflected: usize,
-    /// Taps that the input supports, `usize::MAX` when there is no limit in sight.
+    /// Taps that the input supports, `usize::MAX` where no limit was found.
     pub supported_taps: usize,
     /// Delay in samples where the linear part is a gain with a delay.
     pub delay: Option<usize>,
-    /// What was left after each round.
+    /// The residual after each round.
     pub rounds: Vec<Round>,
-    /// Samples at the start of each experiment that were not scored: the plays' unknown past.
+    /// Samples at the start of each experiment that were not scored: the plays' unknown initial state.
     pub warmups: Vec<usize>,
     /// What the user should know, in sentences.
     pub notes: Vec<String>,

@@ -9,11 +9,13 @@
 //! Everything is fitted and chosen on the record that is given.
 
 mod alternation;
+mod criterion;
 mod identification;
 pub(crate) mod procedure;
 mod quasi_static;
 mod realization;
-pub(crate) mod structure;
+mod settings;
+mod structure;
 
 pub use crate::fit::{
     Grid, HysteresisFit, Parameter, RefineOptions, Refinement, Sensitivities, Status,
@@ -21,6 +23,5 @@ pub use crate::fit::{
 };
 pub use crate::progress::Progress;
 pub use crate::uncertainty::{Bands, NoiseFloor, NoiseMethod, PoleDeviations, ResponseDeviation};
-pub use identification::{Identification, IdentifyOptions, Round};
+pub use identification::{Candidate, Identification, IdentifyOptions, Round};
 pub use procedure::identify;
-pub use structure::Candidate;

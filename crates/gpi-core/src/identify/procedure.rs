@@ -1,26 +1,39 @@
-//! The whole chain: excitation, start, rounds, model.
+//! The steps of an identification: excitation, start values, structures, model.
+//!
+//! 1. The order of persistent excitation is the largest m for which the Gram matrix of m lagged inputs (m times inputs,
+//!    square) is regular. With m <= 4 the record supports a gain and a delay only; `quasi_static` then fits the hysteresis
+//!    before each delay.
+//! 2. Otherwise `alternation` estimates G as a FIR of up to m taps (samples >= 4 taps times inputs), realizes it by
+//!    Ho and Kalman's method (ERA), fits the hysteresis before it, and repeats this with v in place of u.
+//! 3. `structure` refines candidates jointly, from many plays and deadzones to few, then orders of G, each from the best
+//!    one so far; `criterion` compares them by a BIC for autocorrelated residuals.
+//! 4. The best one is simplified, and its uncertainty is computed.
+//!
+//! Source of 1 to 2: K. F. Aljanaideh et al., whose chain starts with u -> y and inverts G to see v; here v is the
+//! hysteresis' own output, so that no noise is run through an inverse.
 
 use crate::chain::bounds::range;
 use crate::chain::hysteresis::Parameters;
 use crate::fit::Grid;
+use crate::fit::joint::Refined;
 use crate::fit::preparation::Prepared;
-use crate::fit::refine::Refined;
 use crate::identify::alternation::{self, Taps};
-use crate::identify::identification::{Identification, IdentifyOptions, Round};
+use crate::identify::identification::{Candidate, Identification, IdentifyOptions, Round};
 use crate::identify::quasi_static;
-use crate::identify::structure::{Candidate, Search};
+use crate::identify::settings::{AlternationPolicy, IdentifySettings, TapPolicy};
+use crate::identify::structure::StructureSearch;
 use crate::linear::{Fir, excitation_limit};
 use crate::progress::{Progress, report};
 use crate::{Error, Record};
 
 /// Identifies a model from a record.
 ///
-/// A record whose input excites few directions (a sine, say) supports no dynamics beyond a gain and a
-/// delay; the delay is then the one that fits best. Otherwise G has the order that the information
+/// A record whose input has a low order of persistent excitation (a sine, say) supports no dynamics beyond a gain and
+/// a delay; the delay is then the one that fits best. Otherwise G has the order that the information
 /// criterion prefers, and the rounds go on until nothing is gained.
 ///
 /// # Errors
-/// A constant input or output, more taps than the input excites or the samples allow, parameters out
+/// A constant input or output, more taps than the order of persistent excitation or the samples allow, parameters out
 /// of range, [`Error::Interrupted`] when `progress` returned false.
 pub fn identify(
     record: &Record,
@@ -49,8 +62,7 @@ pub(crate) fn prepare<'a>(
     options: &IdentifyOptions,
 ) -> Result<Prepared<'a>, Error> {
     record.require_moving()?;
-    let grid = options.half_widths.clone().unwrap_or(Grid::Count(24));
-    Prepared::new(record, channels(record, options, &grid)?)
+    Prepared::new(record, channels(record, options)?)
 }
 
 /// Seeds and compares structures; `fast` rules slow poles out.
@@ -60,6 +72,9 @@ pub(crate) fn compare(
     fast: bool,
     progress: Progress,
 ) -> Result<Compared, Error> {
+    let settings = &IdentifySettings::default();
+    settings.validate()?;
+    let policy = &settings.taps;
     let record = prepared.given;
     let inputs = record.inputs().len();
     let supported = excitation_limit(record)?;
@@ -74,17 +89,16 @@ pub(crate) fn compare(
     }
     report(progress, "excitation", 1.0)?;
     let longest = record.experiments().iter().map(crate::Experiment::scored).max().unwrap_or(0);
-    let affordable = (longest / (4 * inputs)).max(1);
-    let grid = options.half_widths.clone().unwrap_or(Grid::Count(24));
+    let affordable = (longest / (policy.samples * inputs)).max(1);
+    let grid = half_widths(options);
     let sizes = prepared.channels.iter().map(|c| c.half_widths.len() + c.slopes.len() - 1);
     let needed = sizes.sum::<usize>() + record.outputs().len();
     if record.scored() < needed {
         let purpose = "plays, deadzones and offsets".to_owned();
         return Err(Error::TooFewSamples { samples: record.scored(), needed, purpose });
     }
-    // With a gain and a delay nothing is left for more taps to tell.
     let taps = options.taps.unwrap_or(supported.min(affordable));
-    if options.delay.is_some() || taps <= 4 {
+    if options.delay.is_some() || taps <= policy.gain_and_delay {
         if let Some(order) = options.order {
             let requirement = format!(
                 "the input supports {} taps, which is a gain and a delay; leave the order out",
@@ -92,9 +106,10 @@ pub(crate) fn compare(
             );
             return Err(Error::parameter("order", order, requirement));
         }
-        let (points, rounds) = quasi_static::seeds(prepared, options.delay, progress)?;
-        let mut search = Search::new(prepared, options);
-        // A rich hysteresis hides a sample of delay; a simple one beside it may tell.
+        let (points, rounds) =
+            quasi_static::seeds(prepared, options.delay, &settings.quasi_static, progress)?;
+        let mut search = StructureSearch::new(prepared, &settings.structure, options, false);
+        // A rich hysteresis hides a sample of delay, so its neighbours are tried with a simple one.
         for point in &points {
             search.climb(point, progress)?;
         }
@@ -104,23 +119,23 @@ pub(crate) fn compare(
         let stages = (None, Vec::new(), 0, rounds);
         return compared(search, true, stages, supported);
     }
-    let largest = (1200 / inputs).min(1024).min(supported).min(affordable);
-    let count = options.taps.unwrap_or(largest.min(400));
+    let largest = (policy.unknowns / inputs).min(policy.most).min(supported).min(affordable);
+    let count = options.taps.unwrap_or(largest.min(policy.first));
     let mut taps = Taps { count, largest: options.taps.unwrap_or(largest) };
-    let seed = alternation::seed(prepared, &grid, &mut taps, options.order, progress)?;
-    let mut search = Search::new(prepared, options);
-    search.fast = fast;
+    let seed = alternation::seed(prepared, &grid, &mut taps, options.order, settings, progress)?;
+    let mut search = StructureSearch::new(prepared, &settings.structure, options, fast);
     search.climb(&seed.point, progress)?;
     if options.order.is_none() {
         let mut quiet = |_: &str, _: f64| true;
         let mut dynamics = |driven: &Record, order: usize| {
-            alternation::dynamics_of(driven, &mut taps, Some(order), &mut quiet)?.sections()
+            alternation::dynamics_of(driven, &mut taps, Some(order), settings, &mut quiet)?
+                .sections()
         };
         search.orders(&mut dynamics, progress)?;
     }
     if options.order.is_none() && search.shows_nothing_fast() {
-        // Slower than the samples show anything fast: what is slow is looked for beside a gain.
-        let (points, _) = quasi_static::seeds(prepared, None, progress)?;
+        // All poles are slow and the rest is flat: a gain with a delay takes the place of G.
+        let (points, _) = quasi_static::seeds(prepared, None, &settings.quasi_static, progress)?;
         for point in &points {
             search.climb(point, progress)?;
         }
@@ -132,7 +147,7 @@ pub(crate) fn compare(
 }
 
 fn compared(
-    search: Search,
+    search: StructureSearch,
     quasi_static: bool,
     stages: (Option<Fir>, Vec<f64>, usize, Vec<Round>),
     supported: usize,
@@ -143,13 +158,17 @@ fn compared(
     Ok(Compared { chosen, refined, candidates, quasi_static, stages, supported })
 }
 
+/// The half-widths that are given, or as many as usual.
+fn half_widths(options: &IdentifyOptions) -> Grid {
+    let usual = AlternationPolicy::default().half_widths;
+    options.half_widths.clone().unwrap_or(Grid::Count(usual))
+}
+
 /// The hysteresis that the rounds start from: the identity on the given or usual grids.
-fn channels(
-    record: &Record,
-    options: &IdentifyOptions,
-    half_widths: &Grid,
-) -> Result<Vec<Parameters>, Error> {
-    let thresholds = options.thresholds.clone().unwrap_or(Grid::Count(10));
+fn channels(record: &Record, options: &IdentifyOptions) -> Result<Vec<Parameters>, Error> {
+    let half_widths = half_widths(options);
+    let usual = AlternationPolicy::default().thresholds;
+    let thresholds = options.thresholds.clone().unwrap_or(Grid::Count(usual));
     let channel = |input| {
         let (low, high) = range(record, input);
         let zones = thresholds.thresholds((low, high))?;
@@ -159,7 +178,7 @@ fn channels(
     (0..record.inputs().len()).map(channel).collect()
 }
 
-/// The best structure's model and what it rests on.
+/// The best structure's model, and the results of the steps that led to it.
 fn finish(
     prepared: &Prepared,
     found: Compared,
@@ -171,10 +190,10 @@ fn finish(
     let refinement = refined.finish(prepared, progress)?;
     let mut notes = prepared.notes.clone();
     let dynamics = &refinement.bands.point.dynamics;
-    if quasi_static && supported_taps <= 4 {
+    if quasi_static && supported_taps <= TapPolicy::default().gain_and_delay {
         let lag = if dynamics.order() > 0 { " and a lag" } else { "" };
         notes.push(format!(
-            "the input excites {supported_taps} directions per channel only, a gain and a delay: the \
+            "each input is persistently exciting of order {supported_taps} only, enough for a gain and a delay: the \
              linear part is a delay of {} samples{lag}",
             dynamics.delay
         ));

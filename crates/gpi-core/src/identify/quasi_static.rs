@@ -1,11 +1,13 @@
-//! Hysteresis behind a gain with a delay, where the input excites no more.
+//! Hysteresis before a gain with a delay, where the order of persistent excitation allows no more.
 
 use crate::Error;
 use crate::chain::point::{DynamicsFreedom, Point};
+use crate::fit::RefineOptions;
+use crate::fit::joint::fit_options;
 use crate::fit::minimize::fit;
 use crate::fit::preparation::{Prepared, rescale};
-use crate::fit::refine::{RefineOptions, settings};
 use crate::identify::identification::Round;
+use crate::identify::settings::QuasiStaticPolicy;
 use crate::linear::{self, Sections};
 use crate::progress::{Progress, report};
 
@@ -14,25 +16,24 @@ use crate::progress::{Progress, report};
 pub(crate) fn seeds(
     prepared: &Prepared,
     delay: Option<usize>,
+    policy: &QuasiStaticPolicy,
     progress: Progress,
 ) -> Result<(Vec<Point>, Vec<Round>), Error> {
-    const LONGEST_DELAY: usize = 7;
-    /// As many states: a longer delay is better cut out of the record.
-    const LONGEST_GIVEN: usize = 500;
-    if let Some(delay) = delay.filter(|&delay| delay > LONGEST_GIVEN) {
-        let requirement = format!("at most {LONGEST_GIVEN} samples; shift the output instead");
+    let QuasiStaticPolicy { longest, longest_given, steps, gain: least_gain } = *policy;
+    if let Some(delay) = delay.filter(|&delay| delay > longest_given) {
+        let requirement = format!("at most {longest_given} samples; shift the output instead");
         return Err(Error::parameter("delay", delay, requirement));
     }
     let gain = linear::estimate(&prepared.record.pieces(0)?, 1, 0.0)?.markov.remove(0);
-    let delays = delay.map_or(0..=LONGEST_DELAY, |delay| delay..=delay);
-    let mut options = settings(prepared, &RefineOptions::default(), 15);
+    let delays = delay.map_or(0..=longest, |delay| delay..=delay);
+    let mut options = fit_options(prepared, &RefineOptions::default(), steps);
     options.freedom.identity = false;
     options.freedom.dynamics = DynamicsFreedom::Nothing;
-    options.gain = 1e-4;
+    options.gain = least_gain;
     let mut rounds = Vec::new();
     let mut fits: Vec<Point> = Vec::new();
     for delay in delays {
-        report(progress, "delay", delay as f64 / (LONGEST_DELAY + 1) as f64)?;
+        report(progress, "delay", delay as f64 / (longest + 1) as f64)?;
         let mut point = prepared.point(Sections::delayed_gain(&gain, delay));
         rescale(&mut point);
         let fitted = fit(point, &prepared.record, &options, "hysteresis", progress)?;
@@ -42,6 +43,6 @@ pub(crate) fn seeds(
     }
     let rms = |place: &usize| rounds[*place].rms;
     let best = (0..fits.len()).min_by(|i, j| rms(i).total_cmp(&rms(j))).unwrap_or(0);
-    let beside = fits.drain(best.saturating_sub(1)..(best + 2).min(fits.len())).collect();
-    Ok((beside, rounds))
+    let close = fits.drain(best.saturating_sub(1)..(best + 2).min(fits.len())).collect();
+    Ok((close, rounds))
 }

@@ -1,5 +1,6 @@
 //! The linear dynamics from their own input v to y.
 
+use crate::identify::settings::{BLOCK, IdentifySettings, RealizationPolicy};
 use crate::linear::{self, Hankel, NormalEquations, Sections, StateSpace, bounded};
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::DVector;
@@ -30,35 +31,30 @@ pub(crate) struct Refit {
 }
 
 /// Estimates G from a record whose input is v. ERA gives the poles of each candidate order, least
-/// squares on y the zeros; the order is the one with the least Bayesian information criterion.
+/// squares on y the zeros; the order is the one with the least BIC.
 pub(crate) fn estimate(
     record: &Record,
     taps: usize,
-    ridge: f64,
+    settings: &IdentifySettings,
     order: Option<usize>,
     check: &mut dyn FnMut() -> Result<(), Error>,
 ) -> Result<Dynamics, Error> {
-    /// Orders that are tried besides the one that the singular values suggest.
-    const SMALL: std::ops::RangeInclusive<usize> = 1..=6;
-    /// A flat tail of singular values that suggests more than this is noise.
-    const LARGEST: usize = 60;
-    /// A large order has to lower the error of the small ones to this fraction.
-    const WORTH: f64 = 0.8;
-    let fir = linear::estimate(record, taps, ridge)?;
+    let RealizationPolicy { small, largest, worth } = settings.realization;
+    let fir = linear::estimate(record, taps, settings.alternation.ridge)?;
     check()?;
     let hankel = Hankel::new(&fir.markov, None)?;
     let orders: Vec<usize> = match order {
         Some(order) => vec![order],
         None => {
             let suggested = hankel.suggested_order();
-            let rich = suggested > *SMALL.end() && suggested <= LARGEST;
-            SMALL.chain(rich.then_some(suggested)).collect()
+            let rich = suggested > small && suggested <= largest;
+            (1..=small).chain(rich.then_some(suggested)).collect()
         }
     };
     let mut best: Option<(usize, Refit)> = None;
     let mut refusal = None;
     let mut singular_values = Vec::new();
-    // Reflected poles are a sign of states that only follow noise.
+    // Reflected poles indicate states that only describe noise.
     let better = |reflected: usize, refit: &Refit, (least, best): &(usize, Refit)| {
         (reflected > 0, refit.criterion) < (*least > 0, best.criterion)
     };
@@ -73,10 +69,8 @@ pub(crate) fn estimate(
         };
         let refit = refit(record, era.system)?;
         singular_values = era.singular_values;
-        // Many states can follow any misfit a little; they must be worth it.
-        let worth =
-            |(_, best): &(usize, Refit)| order <= *SMALL.end() || refit.rms < WORTH * best.rms;
-        if best.as_ref().is_none_or(|best| worth(best) && better(era.reflected, &refit, best)) {
+        let is_worth = |(_, best): &(usize, Refit)| order <= small || refit.rms < worth * best.rms;
+        if best.as_ref().is_none_or(|best| is_worth(best) && better(era.reflected, &refit, best)) {
             best = Some((era.reflected, refit));
         }
     }
@@ -89,7 +83,6 @@ pub(crate) fn estimate(
 
 /// Fits C, D, an offset and a free response for each output by least squares, A and B kept.
 pub(crate) fn refit(record: &Record, system: StateSpace) -> Result<Refit, Error> {
-    const BLOCK: usize = 1024;
     let (order, inputs, outputs) = (system.order(), system.inputs(), system.outputs());
     let begins = |experiment: &Experiment| experiment.warmup == 0;
     // its offset, and its free response where no run-in hides it
@@ -145,7 +138,7 @@ pub(crate) fn refit(record: &Record, system: StateSpace) -> Result<Refit, Error>
     })
 }
 
-/// The states (order, samples) of a model that stood still before the record.
+/// The states (order, samples) of a model in steady state before the record.
 fn states(system: &StateSpace, experiment: &Experiment) -> Matrix {
     let input = experiment.input.transpose();
     let drive = system.b() * &input;

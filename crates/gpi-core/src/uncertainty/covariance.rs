@@ -1,6 +1,19 @@
-//! How far the estimates may be from the truth: the covariance of a least squares fit under coloured
-//! noise.
+//! The covariance of a least squares fit under autocorrelated noise.
+//!
+//! With H the Gram matrix of the sensitivities and M the score's covariance (both (unknowns, unknowns), see
+//! `fit/certainty.rs`) the covariance of the estimate is `C = H^-1 M H^-1`. Units must not decide what is identifiable, so
+//! rows and columns are scaled by `s_i = sqrt(H_ii)` first: `H_ij / (s_i s_j) = V L V'` has a unit diagonal. Directions V_k
+//! with `L_k <= 1e-12 L_max` are unidentifiable: they are left out of the inverse and kept apart, and the deviation of
+//! every parameter that takes part in one is NaN. Unknowns at a bound are held and have variance zero.
+//!
+//! The number of samples of white noise that the fit uses up is `tr(H^-1 M) / sigma^2`, sigma^2 the residual's variance:
+//! the number of unknowns for white noise, since M is then `sigma^2 H`, and more for slow noise (K. Takeuchi, 1976).
+//!
+//! A function f of the unknowns has the variance `g' C g`, g its gradient (delta method). With the axes
+//! `d_k = S U_k sqrt(l_k)` of `C = S (U l U') S`, S the diagonal matrix of standard deviations, it is the sum of squares of
+//! the derivatives along them: `sum_k ((f(theta + h d_k) - f(theta - h d_k)) / (2 h))^2`.
 
+use super::settings::CovarianceSettings;
 use crate::linear::symmetric_eigen;
 use crate::{Error, Matrix};
 use nalgebra::DVector;
@@ -10,24 +23,22 @@ use nalgebra::DVector;
 pub(crate) struct Uncertainty {
     /// (unknowns, unknowns); zero for those that are held.
     pub covariance: Matrix,
-    /// Directions that the data do not determine, (unknowns, directions), of unit length after scaling
+    /// Unidentifiable directions, (unknowns, directions), of unit length after scaling
     /// every unknown by its column's norm.
     pub open: Matrix,
     /// Parameters that the fit has used up, counted in samples of white noise: `tr(H^-1 M) / variance`.
     pub used: f64,
     /// Parameters that are free: neither held nor at a bound.
     pub estimated: usize,
+    settings: CovarianceSettings,
 }
-
-/// Directions whose eigenvalue is below this fraction of the largest, in columns scaled to one length,
-/// are not determined by the data.
-const IDENTIFIABLE: f64 = 1e-12;
 
 impl Uncertainty {
     /// `H^-1 M H^-1`, H the Gram matrix `gram` of the sensitivities and M that of the score under the residual's
     /// autocorrelation, `scores`, for the unknowns `free`; all others are held. `cost` is the sum of the losses of
     /// so many `samples`.
     pub(crate) fn new(
+        settings: CovarianceSettings,
         gram: &Matrix,
         scores: &Matrix,
         free: &[usize],
@@ -45,7 +56,8 @@ impl Uncertainty {
         };
         let (values, vectors) = descending_eigen(scaled(&gram));
         let largest = values.iter().copied().fold(0.0, f64::max);
-        let rank = values.iter().take_while(|&&value| value > IDENTIFIABLE * largest).count();
+        let rank =
+            values.iter().take_while(|&&value| value > settings.identifiable * largest).count();
         let known = vectors.columns(0, rank);
         let inverse = known
             * Matrix::from_diagonal(&values.rows(0, rank).map(|v| 1.0 / v))
@@ -65,30 +77,25 @@ impl Uncertainty {
                 open[(row, direction - rank)] = vectors[(i, direction)];
             }
         }
-        Self { covariance, open, used, estimated: free.len() }
+        Self { covariance, open, used, estimated: free.len(), settings }
     }
 
-    /// Standard deviations of the unknowns; NaN where an undetermined direction takes part.
+    /// Standard deviations of the unknowns; NaN where an unidentifiable direction takes part.
     pub(crate) fn deviations(&self) -> DVector<f64> {
-        /// A share of an undetermined direction that rounding alone does not give.
-        const SHARE: f64 = 1e-3;
         DVector::from_fn(self.covariance.nrows(), |i, _| {
-            let open = self.open.row(i).amax() > SHARE;
+            let open = self.open.row(i).amax() > self.settings.share;
             if open { f64::NAN } else { self.covariance[(i, i)].max(0.0).sqrt() }
         })
     }
 
-    /// Names and shares of the unknowns in every direction that the data do not determine, the largest
-    /// first.
+    /// Unidentifiable parameters: names and shares of the unknowns in every such direction, the largest first.
     pub(crate) fn undetermined(&self, names: &[String]) -> Vec<Vec<(String, f64)>> {
-        /// Smaller shares than this do not help to see what is mixed up.
-        const SHARE: f64 = 0.05;
         let direction = |column: nalgebra::DVectorView<f64>| {
             let mut shares: Vec<_> = names
                 .iter()
                 .cloned()
                 .zip(column.iter().copied())
-                .filter(|(_, s)| s.abs() > SHARE)
+                .filter(|(_, s)| s.abs() > self.settings.listed)
                 .collect();
             shares.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
             shares
@@ -99,18 +106,16 @@ impl Uncertainty {
     /// Standard deviations of functions of the point, from central differences along the principal
     /// axes of the covariance.
     ///
-    /// `values` are those of the unknowns: a step stays far below them, also along an axis on which the
-    /// data determine nothing.
+    /// `values` are those of the unknowns: a step stays far below them, also along an axis that is
+    /// unidentifiable.
     pub(crate) fn spread(
         &self,
         values_of: &[f64],
         moved: impl Fn(&DVector<f64>) -> Result<Vec<f64>, Error>,
     ) -> Result<Vec<f64>, Error> {
-        /// Fraction of a standard deviation: small enough to be linear, far above rounding.
-        const STEP: f64 = 1e-2;
-        const FAR_BELOW: f64 = 1e-5;
+        let CovarianceSettings { step: longest, part: most, least, axes, .. } = self.settings;
         let largest = values_of.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-        let reach = |value: f64| FAR_BELOW * value.abs().max(1e-4 * largest);
+        let reach = |value: f64| most * value.abs().max(least * largest);
         // Zero for an unknown that is held: rounding must not move it off its place, such as the
         // threshold zero, on whose two sides the deadzone is another one.
         let scale = self.covariance.diagonal().map(|square| square.max(0.0).sqrt());
@@ -120,13 +125,13 @@ impl Uncertainty {
             Matrix::from_fn(n, n, |i, j| self.covariance[(i, j)] / (divisor[i] * divisor[j]));
         let (values, vectors) = descending_eigen(correlation);
         let mut variances: Vec<f64> = Vec::new();
-        for (axis, &value) in values.iter().enumerate().take_while(|(_, value)| **value > 1e-14) {
+        for (axis, &value) in values.iter().enumerate().take_while(|(_, value)| **value > axes) {
             let deviation = vectors.column(axis).component_mul(&scale) * value.sqrt();
             let parts = deviation.iter().zip(values_of);
             let fraction = parts
                 .filter(|(part, _)| **part != 0.0)
                 .map(|(part, value)| reach(*value) / part.abs())
-                .fold(STEP, f64::min);
+                .fold(longest, f64::min);
             let step = deviation * fraction;
             let (above, below) = (moved(&step)?, moved(&-step)?);
             variances.resize(above.len(), 0.0);
@@ -138,12 +143,10 @@ impl Uncertainty {
     }
 }
 
-/// Eigenvalues (descending) and eigenvectors of a symmetric matrix: of a small one by nalgebra, since faer keeps
-/// a workspace of megabytes, more than a record may take.
+/// Eigenvalues (descending) and eigenvectors of a symmetric matrix.
 pub(crate) fn descending_eigen(matrix: Matrix) -> (DVector<f64>, Matrix) {
-    const LARGE: usize = 300;
     let n = matrix.nrows();
-    if n > LARGE
+    if n > CovarianceSettings::default().large
         && let Ok(found) = symmetric_eigen(&matrix)
     {
         return found;

@@ -1,5 +1,21 @@
-//! How small a residual can become: the sensor's noise, estimated without a model where possible.
+//! The smallest residual that a model can leave: the sensor's noise, estimated without a model where possible.
+//!
+//! The noise n of an output is estimated from a residual `e(k) = m(k) + n(k)`, m the model error, by the first of three
+//! methods that the record allows:
+//!
+//! ```text
+//! input of period P:    var n = var(e(k + P) - e(k)) / 2        m repeats and cancels, n does not
+//! input at rest:        var n = sum r(k)^2 / (rows - 2)         r: e of each rest's second half without its line
+//! any input:            var n = mean of |E(w_i)|^2 / sum h^2    over the lines w_i >= 3 pi / 4 of windowed periodograms
+//! ```
+//!
+//! h is Hann's window, E the transform of `h e`. The first two hold for any noise whose memory is shorter than P or a
+//! rest; the third assumes white noise and a model error that is small near half the sampling rate (P. Welch, 1967).
+//! A rest in which the output still moves has a larger variance than the quietest one: with f degrees of freedom the
+//! ratio of two variances of Gaussian noise is `1 +- sqrt(2 / f1 + 2 / f2)`, and rests beyond four such standard errors are
+//! left out.
 
+use super::settings::NoiseFloorSettings;
 use crate::{Experiment, Matrix, Record};
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -13,13 +29,13 @@ pub enum NoiseMethod {
         /// The shortest period found, in samples.
         period: usize,
     },
-    /// From the output while the input stands still, without its slope.
+    /// From the output while the input is constant, without its slope.
     Rests {
         /// Samples that were used.
         samples: usize,
     },
     /// From the residual's power above three quarters of half the sampling rate, as if the noise were
-    /// white. What the model lacks there counts as noise.
+    /// white. Model errors there count as noise.
     HighFrequencyResidual,
 }
 
@@ -50,9 +66,9 @@ impl NoiseFloor {
     /// Differences of the residual between repeated periods come first: `var(e(k + P) - e(k)) / 2`. Without
     /// repetitions the rests are taken: the second half of every stretch of at least 100 samples in
     /// which no input changes, its straight line removed, those left out in which the output still rings.
-    /// Without rests what is left is the residual's power density near half the sampling rate.
+    /// Without rests it is the residual's power density near half the sampling rate.
     ///
-    /// The residual, and not the output: what the model explains of a disturbance is no noise.
+    /// The residual, and not the output: the part of a disturbance that the model explains is not noise.
     pub fn estimate(record: &Record, residuals: &[Matrix]) -> Self {
         Self::from_periods(record, residuals)
             .or_else(|| Self::from_rests(record, residuals))
@@ -76,18 +92,18 @@ impl NoiseFloor {
             count += rows as f64;
         }
         let rms = squares.iter().map(|sum: &f64| (sum / count).sqrt()).collect();
-        (count >= 100.0)
+        (count >= NoiseFloorSettings::default().differences)
             .then_some(Self { rms, method: NoiseMethod::RepeatedPeriods { period: shortest } })
     }
 
     fn from_rests(record: &Record, residuals: &[Matrix]) -> Option<Self> {
-        /// The shortest stretch that counts, and the fewest samples that make an estimate.
-        const SHORTEST: usize = 100;
-        const FEWEST: usize = 200;
+        let settings = NoiseFloorSettings::default();
         // Sums of squares around a line, and their degrees of freedom.
         let mut found: Vec<(DVector<f64>, f64)> = Vec::new();
         for (residual, experiment) in residuals.iter().zip(record.experiments()) {
-            for (start, end) in rests(experiment).into_iter().filter(|(a, b)| b - a >= SHORTEST) {
+            for (start, end) in
+                rests(experiment).into_iter().filter(|(a, b)| b - a >= settings.rest)
+            {
                 let rows = (end - start) / 2;
                 let output = residual.rows(end - rows, rows);
                 let squares = output.column_iter().map(|column| around_a_line(&column.into()));
@@ -97,28 +113,30 @@ impl NoiseFloor {
         // The output may still ring or creep in some: they are louder than the quietest one.
         let loudness = |(squares, freedom): &(DVector<f64>, f64)| squares.sum() / freedom;
         let quietest = found.iter().min_by(|a, b| loudness(a).total_cmp(&loudness(b)))?.clone();
-        let limit = |freedom: f64| 1.0 + 4.0 * (2.0 / freedom + 2.0 / quietest.1).sqrt();
+        let limit = |freedom: f64| {
+            1.0 + settings.standard_errors * (2.0 / freedom + 2.0 / quietest.1).sqrt()
+        };
         found.retain(|rest| loudness(rest) <= limit(rest.1) * loudness(&quietest));
         let freedom: f64 = found.iter().map(|rest| rest.1).sum();
         let squares =
             found.iter().fold(DVector::zeros(record.outputs().len()), |sum, rest| sum + &rest.0);
         let samples = freedom as usize + 2 * found.len();
         let rms: Vec<f64> = squares.iter().map(|sum| (sum / freedom).sqrt()).collect();
-        // A sensor that shows one value all along (its quantization is coarser than its noise) says nothing.
-        let useful = samples >= FEWEST && rms.iter().all(|&value| value > 0.0);
+        // A sensor whose output is constant (its quantization is coarser than its noise) does not show its noise.
+        let useful = samples >= settings.samples && rms.iter().all(|&value| value > 0.0);
         useful.then_some(Self { rms, method: NoiseMethod::Rests { samples } })
     }
 
     /// White noise that has the residual's power density above three quarters of half the rate, from
     /// periodograms of up to 4096 samples under Hann's window.
     pub fn from_residuals(record: &Record, residuals: &[Matrix]) -> Self {
-        const LONGEST: usize = 4096;
+        let longest = NoiseFloorSettings::default().periodogram;
         let mut planner = FftPlanner::new();
         let rms = (0..record.outputs().len()).map(|output| {
             let (mut power, mut lines) = (0.0, 0.0);
             for (residual, experiment) in residuals.iter().zip(record.experiments()) {
                 for scored in experiment.scored_rows(residual) {
-                    let length = scored.nrows().min(LONGEST);
+                    let length = scored.nrows().min(longest);
                     for first in (0..=scored.nrows() - length).step_by(length) {
                         let piece = scored.view((first, output), (length, 1)).into_owned();
                         let (own, count) = high_lines(&mut planner, piece.as_slice());
@@ -136,7 +154,6 @@ impl NoiseFloor {
 /// Sum of the variances of white noise that every line above three quarters of half the rate stands
 /// for, and how many lines there are.
 fn high_lines(planner: &mut FftPlanner<f64>, values: &[f64]) -> (f64, f64) {
-    const BAND: f64 = 0.75;
     let n = values.len();
     let mean = values.iter().sum::<f64>() / n as f64;
     // Hann's window: what leaks from low frequencies does not reach the band
@@ -145,7 +162,7 @@ fn high_lines(planner: &mut FftPlanner<f64>, values: &[f64]) -> (f64, f64) {
     let mut spectrum: Vec<Complex64> = windowed.map(|value| Complex64::new(value, 0.0)).collect();
     planner.plan_fft_forward(n).process(&mut spectrum);
     let half = n / 2;
-    let first = (BAND * half as f64).ceil() as usize;
+    let first = (NoiseFloorSettings::default().band * half as f64).ceil() as usize;
     let band = &spectrum[first..=half.min(n - 1)];
     let energy: f64 = (0..n).map(|k| window(k).powi(2)).sum();
     let density: f64 = band.iter().map(Complex64::norm_sqr).sum();
@@ -155,7 +172,7 @@ fn high_lines(planner: &mut FftPlanner<f64>, values: &[f64]) -> (f64, f64) {
 /// The period of an input (samples, inputs) that is repeated at least once in full.
 fn period(input: &Matrix) -> Option<usize> {
     let samples = input.nrows();
-    let tolerance = 1e-9 * (input.max() - input.min());
+    let tolerance = NoiseFloorSettings::default().repeated * (input.max() - input.min());
     // Where the input differs most from its start, a wrong period shows at once.
     let place = (0..samples / 2).max_by(|&i, &j| {
         let far = |k: usize| (input.row(k) - input.row(0)).amax();

@@ -1,5 +1,6 @@
-//! The residual's own colour, as an autoregression.
+//! The residual's own autocorrelation, as an autoregression.
 
+use super::settings::NoiseModelSettings;
 use crate::{Matrix, Record};
 use nalgebra::DVector;
 
@@ -14,16 +15,16 @@ pub(crate) struct NoiseModel {
 
 impl NoiseModel {
     /// Fits orders up to 30 by Levinson and Durbin's recursion to the scored samples; each output takes
-    /// the order with the least Bayesian information criterion.
+    /// the order with the least BIC.
     pub(crate) fn of(residuals: &[Matrix], record: &Record) -> Self {
-        const LONGEST: usize = 30;
         let outputs = residuals[0].ncols();
         let samples = record.scored();
         let scored = || {
             let pairs = residuals.iter().zip(record.experiments());
             pairs.flat_map(|(residual, experiment)| experiment.scored_rows(residual))
         };
-        let longest = LONGEST.min(samples / 20);
+        let settings = NoiseModelSettings::default();
+        let longest = settings.order.min(samples / settings.samples);
         let coefficients: Vec<Vec<f64>> = (0..outputs)
             .map(|output| {
                 let mut covariances = vec![0.0; longest + 1];
@@ -54,7 +55,7 @@ impl NoiseModel {
 }
 
 impl NoiseModel {
-    /// Residuals without what their past predicts; the first samples, whose past is not known, are zero.
+    /// Prediction errors of the residuals; the first samples, which cannot be predicted, are zero.
     pub(crate) fn whiten(&self, residuals: &[Matrix]) -> Vec<Matrix> {
         let whiten = |residual: &Matrix| {
             Matrix::from_fn(residual.nrows(), residual.ncols(), |k, output| {
@@ -70,8 +71,9 @@ impl NoiseModel {
     }
 }
 
-/// The autoregression with the least Bayesian information criterion.
+/// The autoregression with the least BIC.
 fn levinson(covariances: &[f64], samples: usize) -> Vec<f64> {
+    let NoiseModelSettings { rounding, .. } = NoiseModelSettings::default();
     let mut filter: Vec<f64> = Vec::new();
     let mut variance = covariances[0];
     let penalty = (samples.max(2) as f64).ln();
@@ -81,7 +83,7 @@ fn levinson(covariances: &[f64], samples: usize) -> Vec<f64> {
     let mut best = (criterion(variance, 0), filter.clone());
     for order in 1..covariances.len() {
         // A residual without noise, or rounding on one that is predicted exactly.
-        if variance <= 1e-12 * covariances[0] || variance <= 0.0 {
+        if variance <= rounding * covariances[0] || variance <= 0.0 {
             break;
         }
         let predicted: f64 =

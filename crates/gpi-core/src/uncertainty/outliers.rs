@@ -1,5 +1,6 @@
 //! Isolated wrong samples in a residual.
 
+use super::settings::OutlierSettings;
 use crate::{Matrix, Record};
 
 /// Median absolute deviation over that of a Gaussian: a standard deviation that a few wrong samples do
@@ -28,22 +29,17 @@ pub(crate) fn deviations(residuals: &[Matrix], record: &Record) -> Vec<f64> {
 
 /// How many scored samples of a residual are isolated outliers, see [`places`].
 pub(crate) fn count(residuals: &[Matrix], record: &Record) -> usize {
-    /// Outliers may stand close together.
-    const NEAR: usize = 2;
-    places(residuals, record, NEAR).iter().flatten().map(Vec::len).sum()
+    places(residuals, record, OutlierSettings::default().near).iter().flatten().map(Vec::len).sum()
 }
 
-/// The scored samples of signals (samples, outputs) that stand apart, `[experiment][output]`.
+/// The scored samples of signals (samples, outputs) that are isolated outliers, `[experiment][output]`.
 ///
-/// A sample stands apart when it differs from the median of its four neighbours by more than six robust
+/// A sample is one when it differs from the median of its four neighbours by more than six robust
 /// standard deviations of such differences, and by four times more than the samples around
 /// (but for `near` of them, which may be wrong themselves): slow or structured signals have none, however
 /// rough, and the fewer the smaller `near` is.
 pub(crate) fn places(signals: &[Matrix], record: &Record, near: usize) -> Vec<Vec<Vec<usize>>> {
-    const APART: f64 = 6.0;
-    const ALONE: f64 = 4.0;
-    /// Of the samples around.
-    const AROUND: std::ops::RangeInclusive<usize> = 1..=12;
+    let OutlierSettings { apart: far, alone: factor, around: reach, .. } = Default::default();
     let mut found = vec![vec![Vec::new(); record.outputs().len()]; signals.len()];
     for output in 0..record.outputs().len() {
         let differences: Vec<Vec<f64>> =
@@ -51,7 +47,7 @@ pub(crate) fn places(signals: &[Matrix], record: &Record, near: usize) -> Vec<Ve
         let scored = differences.iter().zip(record.experiments()).flat_map(|(values, e)| {
             e.scored_runs().flatten().filter_map(|k| values.get(k).copied())
         });
-        let limit = APART * robust_deviation(scored);
+        let limit = far * robust_deviation(scored);
         for (index, (values, experiment)) in
             differences.iter().zip(record.experiments()).enumerate()
         {
@@ -61,11 +57,11 @@ pub(crate) fn places(signals: &[Matrix], record: &Record, near: usize) -> Vec<Ve
                 if own <= limit {
                     return false;
                 }
-                let mut around: Vec<f64> = AROUND
+                let mut around: Vec<f64> = (1..=reach)
                     .flat_map(|lag| [size(k.checked_sub(lag)), size(Some(k + lag))])
                     .collect();
                 around.sort_by(|a, b| b.total_cmp(a));
-                own > ALONE * around[near]
+                own > factor * around[near]
             };
             found[index][output] = experiment.scored_runs().flatten().filter(alone).collect();
         }
@@ -73,13 +69,13 @@ pub(crate) fn places(signals: &[Matrix], record: &Record, near: usize) -> Vec<Ve
     found
 }
 
-/// What every sample differs by from the median of its four neighbours; zero at the ends.
+/// The difference of every sample from the median of its four neighbours; zero at the ends.
 fn apart(values: &[f64]) -> Vec<f64> {
     let mut differences = vec![0.0; values.len()];
     for k in 2..values.len().saturating_sub(2) {
-        let mut beside = [values[k - 2], values[k - 1], values[k + 1], values[k + 2]];
-        beside.sort_by(f64::total_cmp);
-        differences[k] = values[k] - 0.5 * (beside[1] + beside[2]);
+        let mut near = [values[k - 2], values[k - 1], values[k + 1], values[k + 2]];
+        near.sort_by(f64::total_cmp);
+        differences[k] = values[k] - 0.5 * (near[1] + near[2]);
     }
     differences
 }

@@ -17,7 +17,7 @@ mod simulated;
 mod whiteness;
 mod wrong_samples;
 
-use crate::fit::refine::require_match;
+use crate::fit::preparation::require_match;
 use crate::identify::{Progress, residuals_from_fitted_start};
 use crate::{Error, Matrix, Model, Record};
 use compared::Compared;

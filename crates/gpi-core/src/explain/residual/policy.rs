@@ -2,7 +2,7 @@
 //! policy).
 
 use crate::Error;
-use crate::explain::settings::{FROM_ONE, PART, POSITIVE, settings};
+use crate::settings::{FROM_ONE, PART, POSITIVE, settings};
 
 settings! {
     /// How a residual is tested.

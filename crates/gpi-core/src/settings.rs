@@ -4,14 +4,14 @@ use crate::Error;
 use std::ops::RangeInclusive;
 
 /// A part of something.
-pub(super) const PART: RangeInclusive<f64> = 0.0..=1.0;
+pub(crate) const PART: RangeInclusive<f64> = 0.0..=1.0;
 /// At least one, or a factor that must not shrink what it is applied to.
-pub(super) const FROM_ONE: RangeInclusive<f64> = 1.0..=1e12;
+pub(crate) const FROM_ONE: RangeInclusive<f64> = 1.0..=1e12;
 /// Any positive size.
-pub(super) const POSITIVE: RangeInclusive<f64> = f64::MIN_POSITIVE..=1e12;
+pub(crate) const POSITIVE: RangeInclusive<f64> = f64::MIN_POSITIVE..=1e12;
 
 /// What a policy is made of.
-pub(super) trait Setting {
+pub(crate) trait Setting {
     /// Whether every number lies in a range.
     fn lies_in(&self, range: &RangeInclusive<f64>) -> bool;
 }
@@ -35,7 +35,7 @@ impl<T: Setting, const N: usize> Setting for [T; N] {
 }
 
 /// Refuses a value outside the range in which it means something.
-pub(super) fn require<T: Setting + std::fmt::Debug>(
+pub(crate) fn require<T: Setting + std::fmt::Debug>(
     name: &'static str,
     value: &T,
     range: &RangeInclusive<f64>,
@@ -67,10 +67,10 @@ macro_rules! settings {
         impl $name {
             /// Refuses settings that mean nothing.
             pub(crate) fn validate(&self) -> Result<(), Error> {
-                $(crate::explain::settings::require(stringify!($field), &self.$field, &$range)?;)*
+                $(crate::settings::require(stringify!($field), &self.$field, &$range)?;)*
                 Ok(())
             }
         }
     )*};
 }
-pub(super) use settings;
+pub(crate) use settings;

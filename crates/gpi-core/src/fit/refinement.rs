@@ -1,0 +1,60 @@
+//! What is asked of a refinement, and what it answers.
+
+use crate::Matrix;
+use crate::optimize::Status;
+use crate::uncertainty::{Bands, NoiseFloor};
+
+/// What a refinement may move besides weights, deadzone weights, dynamics and offset, and how residuals
+/// count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RefineOptions {
+    /// Whether the thresholds of the deadzones move; they stay on their side of zero.
+    pub thresholds: bool,
+    /// Whether the half-widths of the plays move; the widest one stays and sets the scale of z.
+    pub half_widths: bool,
+    /// Huber's loss instead of squares; decided by whether isolated outliers are found when `None`.
+    pub robust: Option<bool>,
+    /// Knots of a slowly varying offset of each experiment, linear between them; at most 1 is a
+    /// constant. It is estimated so that it does not disturb the rest; the model keeps its mean.
+    pub offset_knots: usize,
+}
+
+/// An estimated number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Such as `u.weights[3]`: numbered as in the model.
+    pub name: String,
+    /// The estimate.
+    pub value: f64,
+    /// Its standard deviation; 0 for a weight that is held at zero by its bound, NaN where the data do
+    /// not determine it.
+    pub deviation: f64,
+}
+
+/// How a model was refined, and the uncertainty of its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refinement {
+    /// How it ended.
+    pub status: Status,
+    /// Root mean square residual at the start and after every step that was accepted.
+    pub history: Vec<f64>,
+    /// All that was estimated, with standard deviations from the residual's own autocorrelation.
+    pub parameters: Vec<Parameter>,
+    /// Covariance of these parameters.
+    pub covariance: Matrix,
+    /// Unidentifiable parameters: names and shares of each combination that the data do not determine, largest first.
+    pub undetermined: Vec<Vec<(String, f64)>>,
+    /// Root mean square residual of each output on the training data.
+    pub residual_rms: Vec<f64>,
+    /// Measured minus simulated outputs of each experiment, (samples, outputs), with the initial
+    /// states that were fitted; warm-ups included.
+    pub residuals: Vec<Matrix>,
+    /// The noise of each output, and what it was estimated from.
+    pub noise_floor: NoiseFloor,
+    /// Isolated outliers in the residual.
+    pub outliers: usize,
+    /// Whether Huber's loss was used.
+    pub robust: bool,
+    /// Standard deviations of whatever follows from the parameters.
+    pub bands: Bands,
+}

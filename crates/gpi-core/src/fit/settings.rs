@@ -1,0 +1,164 @@
+//! Every tolerance and every choice of the fits, with its meaning and the reason for its value.
+//!
+//! "By hand" means that nobody derived the value; `gpi reproduce` and docs/scoreboard.md show what all values
+//! together achieve.
+
+use crate::Error;
+use crate::settings::{FROM_ONE, PART, POSITIVE, settings};
+
+/// How a point is prepared and fitted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct FitSettings {
+    /// Which samples are scored, and which initial states are fitted.
+    pub preparation: PreparationSettings,
+    /// The joint fit.
+    pub joint: JointSettings,
+    /// What is removed from a fitted model.
+    pub simplification: SimplificationSettings,
+    /// The fit of the initial state alone.
+    pub initial_state: InitialStateSettings,
+    /// When parts of a few experiments give the curvature of all; a fit uses the defaults.
+    pub representatives: RepresentativeSettings,
+    /// How long the memory of a stage's dynamics may be; a search uses the defaults.
+    pub memory: MemorySettings,
+}
+
+impl FitSettings {
+    /// Refuses settings that mean nothing.
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        self.preparation.validate()?;
+        self.joint.validate()?;
+        let JointSettings { fewest_steps, most_steps, .. } = self.joint;
+        if fewest_steps > most_steps {
+            let requirement = format!("at most `most_steps`, {most_steps}");
+            return Err(Error::parameter("fewest_steps", fewest_steps, requirement));
+        }
+        self.simplification.validate()?;
+        self.initial_state.validate()?;
+        self.representatives.validate()?;
+        self.memory.validate()
+    }
+}
+
+settings! {
+    /// Which samples are scored, and which initial states are fitted.
+    struct PreparationSettings {
+        /// Part of an experiment that may be left out of the score while the plays lose their unknown initial
+        /// state. Where they need longer, their initial state is fitted. By hand.
+        forgetting: f64 = 0.1, PART;
+        /// An experiment starts at rest if its first samples, so many, are zero. By hand.
+        quiet: usize = 10, FROM_ONE;
+        /// Part of the largest input below which an input is zero: far below any resolution, above rounding.
+        zero: f64 = 1e-9, PART;
+    }
+
+    /// The joint fit.
+    struct JointSettings {
+        /// Steps after which a candidate is compared with the best one so far. By hand: the cost falls most in them.
+        first_steps: usize = 15, FROM_ONE;
+        /// Steps, accepted or not: between these numbers, and so many that `products` are not exceeded.
+        fewest_steps: usize = 40, FROM_ONE;
+        most_steps: usize = 300, FROM_ONE;
+        /// Multiplications of all Gram matrices of a fit: about a minute of one core.
+        products: f64 = 4e11, POSITIVE;
+        /// Steps of a quick fit, whose model is refined again when more is known. By hand.
+        quick_steps: usize = 40, FROM_ONE;
+        /// Part of the cost below which a step of a quick fit is the last, where each step takes long. By hand.
+        quick_gain: f64 = 1e-3, PART;
+        /// Multiplications of a quick fit beyond which plays of weight zero are not tried elsewhere: about two
+        /// seconds.
+        quick_products: f64 = 1e10, POSITIVE;
+        /// A step that lowers the cost by less than this part of one value's share is the last: a superfluous
+        /// parameter gains one share on average, so finer steps would fit noise.
+        gain: f64 = 0.1, PART;
+        /// Limits of that as a part of the cost: rounding, and what a record of few samples still needs. By hand.
+        least_gain: f64 = 1e-9, PART;
+        largest_gain: f64 = 1e-4, PART;
+        /// Isolated outliers from which on Huber's loss is used: one or two do not bias a fit. By hand.
+        outliers: usize = 3, FROM_ONE;
+        /// Passes of Huber's loss, each with the scale of the previous residual, which has settled after three.
+        passes: usize = 3, FROM_ONE;
+        /// Robust standard deviations at which Huber's loss becomes linear: 95 % of the efficiency of least squares
+        /// on Gaussian noise (Huber, Robust Statistics, 1981).
+        turn: f64 = 1.345, POSITIVE;
+        /// Part of the cost that a play must take which was placed again, to be worth another round. By hand.
+        worth: f64 = 1e-3, PART;
+    }
+
+    /// What is removed from a fitted model.
+    struct SimplificationSettings {
+        /// Steps of the fit that follows a removal: it starts at a minimum, or close to one. By hand.
+        steps: usize = 20, FROM_ONE;
+        /// Times that unidentifiable deadzones are removed. By hand: one or two are enough on real records.
+        passes: usize = 5, FROM_ONE;
+        /// Squares, in units of the residual's variance, that may be lost by a pass: what five superfluous
+        /// parameters gain on average. By hand.
+        loss: f64 = 5.0, POSITIVE;
+        /// Part by which rounding may raise the cost of a bridged envelope. By hand.
+        rounding: f64 = 1e-6, PART;
+    }
+
+    /// The fit of the initial state alone.
+    struct InitialStateSettings {
+        /// Steps of each fit: more than any record of the tests needed.
+        steps: usize = 60, FROM_ONE;
+        /// Initial places of the plays between z - r (-1) and z + r (1), one fit from each: the cost has a minimum
+        /// wherever another set of plays turns at the first peaks. By hand.
+        places: [f64; 3] = [0.0, -0.5, 0.5], -1.0..=1.0;
+    }
+
+    /// The fit of a hysteresis to an intermediate signal.
+    struct HysteresisSettings {
+        /// Steps, and the part of the cost below which a step is the last. By hand.
+        steps: usize = 60, FROM_ONE;
+        gain: f64 = 1e-4, PART;
+    }
+
+    /// When parts of a few experiments give the curvature of all.
+    struct RepresentativeSettings {
+        /// Multiplications of one Gram matrix that take long: about a second.
+        long: f64 = 1e10, POSITIVE;
+        /// Values for each unknown that determine the curvature well enough for a step. By hand.
+        enough: f64 = 25.0, FROM_ONE;
+        /// Experiments at least: one each of small, middle and large amplitude.
+        fewest: f64 = 3.0, FROM_ONE;
+        /// Part of the record from which on the choice saves too little time. By hand.
+        most: f64 = 0.5, PART;
+        /// Part to which the slowest pole must have decayed before the scored part: one percent.
+        decayed: f64 = 0.01, f64::MIN_POSITIVE..=1.0;
+    }
+
+    /// How long the memory of a stage's dynamics may be.
+    struct MemorySettings {
+        /// Part of the longest experiment: a slower pole follows a disturbance. By hand.
+        part: f64 = 0.05, PART;
+    }
+}
+
+/// Part of the outputs' squares that rounding leaves: the square of some thousand times the machine's epsilon.
+pub(crate) const ROUNDING: f64 = 1e-25;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usual_settings_are_valid() {
+        FitSettings::default().validate().unwrap();
+        HysteresisSettings::default().validate().unwrap();
+    }
+
+    #[test]
+    fn nonsense_is_refused_by_name() {
+        let refused = |change: fn(&mut FitSettings)| {
+            let mut settings = FitSettings::default();
+            change(&mut settings);
+            settings.validate().unwrap_err().to_string()
+        };
+        assert!(refused(|s| s.preparation.forgetting = 2.0).contains("forgetting"));
+        assert!(refused(|s| s.joint.turn = f64::NAN).contains("turn"));
+        assert!(refused(|s| s.joint.fewest_steps = 301).contains("most_steps"));
+        assert!(refused(|s| s.simplification.loss = 0.0).contains("loss"));
+        assert!(refused(|s| s.initial_state.places[1] = -1.5).contains("places"));
+    }
+}

@@ -1,0 +1,163 @@
+//! The comparison of structures by an information criterion.
+//!
+//! A candidate of p estimated parameters leaves a residual of root mean square e over N output values. BIC for a white
+//! residual is `N ln e^2 + p ln N`. An autocorrelated residual holds less information: a parameter then takes the part of
+//! c samples of white noise from it, with `c = tr(H^-1 M) / (p sigma^2)`, H the Gram matrix of the sensitivities, M the
+//! score's covariance and sigma^2 the residual's variance (K. Takeuchi, 1976; c = 1 for white noise). The criterion is
+//!
+//! ```text
+//! N ln e^2 + c p ln N
+//! ```
+//!
+//! with one c for all candidates, that of the smallest residual, which is closest to the noise itself.
+
+use crate::Error;
+use crate::chain::point::Point;
+use crate::effects::longest_lag;
+use crate::fit::RefineOptions;
+use crate::fit::joint::{Refined, joint};
+use crate::fit::memory::Memory;
+use crate::fit::preparation::Prepared;
+use crate::identify::identification::Candidate;
+use crate::identify::settings::StructurePolicy;
+use crate::progress::Progress;
+use std::f64::consts::PI;
+
+/// Refines structures and compares them.
+pub(super) struct Comparison<'a> {
+    pub prepared: &'a Prepared<'a>,
+    pub policy: &'a StructurePolicy,
+    options: RefineOptions,
+    /// Whether poles that are slower than a mechanical stage's dynamics rule a candidate out: they follow
+    /// creep and disturbances.
+    fast: bool,
+    candidates: Vec<Candidate>,
+    /// What each candidate became, and the samples of white noise that a parameter takes from its residual.
+    refined: Vec<(Refined, f64)>,
+}
+
+impl<'a> Comparison<'a> {
+    pub(super) fn new(
+        prepared: &'a Prepared<'a>,
+        policy: &'a StructurePolicy,
+        options: RefineOptions,
+        fast: bool,
+    ) -> Self {
+        Self { prepared, policy, options, fast, candidates: Vec::new(), refined: Vec::new() }
+    }
+
+    /// Refines a point; says whether it is better than all before.
+    pub(super) fn offer(&mut self, point: Point, progress: Progress) -> Result<bool, Error> {
+        let usable = self.refined.iter().filter(|(refined, _)| self.is_usable(refined));
+        let costs = usable.map(|(refined, _)| refined.fitted.linearization.cost);
+        let hopeless = self.policy.hopeless * costs.fold(f64::INFINITY, f64::min);
+        let refined = joint(point, self.prepared, &self.options, hopeless, self.fast, progress)?;
+        let uncertainty = refined.uncertainty(&self.prepared.record, progress)?;
+        let parameters = uncertainty.estimated;
+        let point = &refined.fitted.point;
+        self.candidates.push(Candidate {
+            delay: point.dynamics.delay,
+            order: point.dynamics.order(),
+            plays: point.channels[0].half_widths.len(),
+            deadzones: point.channels[0].thresholds.len() - 1,
+            rms: (refined.fitted.linearization.cost / self.prepared.values()).sqrt(),
+            parameters,
+            used: 0.0,
+            criterion: 0.0,
+        });
+        let samples = (uncertainty.used / parameters.max(1) as f64).max(1.0);
+        self.refined.push((refined, samples));
+        self.compare();
+        Ok(self.chosen() == Some(self.candidates.len() - 1))
+    }
+
+    /// Works the criteria out, with the autocorrelation of the smallest residual.
+    fn compare(&mut self) {
+        let values = self.prepared.values();
+        let samples = self.closest().map_or(1.0, |place| self.refined[place].1);
+        let usable: Vec<bool> = self.refined.iter().map(|(r, _)| self.is_usable(r)).collect();
+        for (candidate, usable) in self.candidates.iter_mut().zip(usable) {
+            let deviance = 2.0 * values * candidate.rms.max(f64::MIN_POSITIVE).ln();
+            candidate.used = samples * candidate.parameters as f64;
+            let penalty = if usable { candidate.used * values.ln() } else { f64::INFINITY };
+            candidate.criterion = deviance + penalty;
+        }
+    }
+
+    /// Whether slow poles rule out all candidates, and G of the best one is flat beyond them.
+    pub(super) fn shows_nothing_fast(&self) -> bool {
+        let StructurePolicy { frequencies, flat, .. } = *self.policy;
+        if self.has_usable() {
+            return false;
+        }
+        let Some(best) = self.closest() else { return false };
+        let dynamics = &self.refined[best].0.fitted.point.dynamics;
+        // twice the corner of the longest lag that is dynamics
+        let lowest = (2.0 / longest_lag(self.prepared.record.rate())).min(1.0);
+        let frequency = |i: usize| lowest * (PI / lowest).powf(i as f64 / frequencies as f64);
+        let gains = (0..frequencies).map(|i| dynamics.response(frequency(i)).norm());
+        let (low, high) = gains
+            .fold((f64::INFINITY, 0.0_f64), |(low, high), gain| (low.min(gain), high.max(gain)));
+        high < flat * low
+    }
+
+    /// The criterion of the last candidate.
+    pub(super) fn last_criterion(&self) -> f64 {
+        self.candidates.last().map_or(f64::INFINITY, |candidate| candidate.criterion)
+    }
+
+    /// Whether any candidate is usable.
+    pub(super) fn has_usable(&self) -> bool {
+        self.refined.iter().any(|(refined, _)| self.is_usable(refined))
+    }
+
+    /// Withdraws the last candidate where a pole of it is slower than `slowest`.
+    pub(super) fn withdraw_slow(&mut self, slowest: f64) {
+        let is_slow = |(refined, _): &(Refined, f64)| {
+            let poles = refined.fitted.point.dynamics.poles();
+            poles.iter().any(|pole| pole.norm() > slowest)
+        };
+        if self.refined.last().is_some_and(is_slow) {
+            self.refined.pop();
+            self.candidates.pop();
+            self.compare();
+        }
+    }
+
+    /// The best fit of all without the poles that rule it out, where there is one.
+    pub(super) fn without_slow_poles(&self) -> Result<Option<Point>, Error> {
+        let Some(place) = self.closest().filter(|_| self.fast) else { return Ok(None) };
+        let memory = Memory::of(&self.prepared.record);
+        let point = &self.refined[place].0.fitted.point;
+        point.without(|pole| memory.is_exceeded_by(pole))
+    }
+
+    fn is_usable(&self, refined: &Refined) -> bool {
+        let memory = Memory::of(&self.prepared.record);
+        let poles = refined.fitted.point.dynamics.poles();
+        !self.fast || !poles.iter().any(|pole| memory.is_exceeded_by(pole))
+    }
+
+    /// The place of the candidate with the least residual, usable or not.
+    fn closest(&self) -> Option<usize> {
+        let rms = |i: usize| self.candidates[i].rms;
+        (0..self.candidates.len()).min_by(|&i, &j| rms(i).total_cmp(&rms(j)))
+    }
+
+    /// The place of the candidate with the least criterion.
+    fn chosen(&self) -> Option<usize> {
+        let criterion = |i: usize| self.candidates[i].criterion;
+        (0..self.candidates.len()).min_by(|&i, &j| criterion(i).total_cmp(&criterion(j)))
+    }
+
+    /// The refined point of the best candidate.
+    pub(super) fn best(&self) -> Option<&Point> {
+        self.chosen().map(|place| &self.refined[place].0.fitted.point)
+    }
+
+    /// The best candidate's place and what it became, and all candidates.
+    pub(super) fn finish(mut self) -> Option<(usize, Refined, Vec<Candidate>)> {
+        let chosen = self.chosen()?;
+        Some((chosen, self.refined.swap_remove(chosen).0, self.candidates))
+    }
+}
