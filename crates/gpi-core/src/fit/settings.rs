@@ -65,8 +65,8 @@ settings! {
         quick_steps: usize = 40, FROM_ONE;
         /// Part of the cost below which a step of a quick fit is the last, where each step takes long. By hand.
         quick_gain: f64 = 1e-3, PART;
-        /// Multiplications of a quick fit beyond which plays of weight zero are not tried elsewhere: about two
-        /// seconds.
+        /// Multiplications of a quick fit beyond which plays of weight zero are not tried elsewhere. By
+        /// hand.
         quick_products: f64 = 1e10, POSITIVE;
         /// A step that lowers the cost by less than this part of one value's share is the last: a superfluous
         /// parameter gains one share on average, so finer steps would fit noise.
@@ -76,7 +76,7 @@ settings! {
         largest_gain: f64 = 1e-4, PART;
         /// Isolated outliers from which on Huber's loss is used: one or two do not bias a fit. By hand.
         outliers: usize = 3, FROM_ONE;
-        /// Passes of Huber's loss, each with the scale of the previous residual, which has settled after three.
+        /// Passes of Huber's loss, each with the scale of the previous residual. By hand.
         passes: usize = 3, FROM_ONE;
         /// Robust standard deviations at which Huber's loss becomes linear: 95 % of the efficiency of least squares
         /// on Gaussian noise (Huber, Robust Statistics, 1981).
@@ -89,7 +89,7 @@ settings! {
     struct SimplificationSettings {
         /// Steps of the fit that follows a removal: it starts at a minimum, or close to one. By hand.
         steps: usize = 20, FROM_ONE;
-        /// Times that unidentifiable deadzones are removed. By hand: one or two are enough on real records.
+        /// Times that unidentifiable deadzones are removed. By hand.
         passes: usize = 5, FROM_ONE;
         /// Squares, in units of the residual's variance, that may be lost by a pass: what five superfluous
         /// parameters gain on average. By hand.
@@ -100,7 +100,7 @@ settings! {
 
     /// The fit of the initial state alone.
     struct InitialStateSettings {
-        /// Steps of each fit: more than any record of the tests needed.
+        /// Steps of each fit: by hand.
         steps: usize = 60, FROM_ONE;
         /// Initial places of the plays between z - r (-1) and z + r (1), one fit from each: the cost has a minimum
         /// wherever another set of plays turns at the first peaks. By hand.
@@ -116,7 +116,7 @@ settings! {
 
     /// When parts of a few experiments give the curvature of all.
     struct RepresentativeSettings {
-        /// Multiplications of one Gram matrix that take long: about a second.
+        /// Multiplications of one Gram matrix that take long. By hand.
         long: f64 = 1e10, POSITIVE;
         /// Values for each unknown that determine the curvature well enough for a step. By hand.
         enough: f64 = 25.0, FROM_ONE;

@@ -39,9 +39,9 @@ settings! {
         gain_and_delay: usize = 4, FROM_ONE;
         /// Samples of the longest experiment for each tap, and each input, at least. By hand.
         samples: usize = 4, FROM_ONE;
-        /// Taps of the first estimate. By hand: enough for a resonance that decays over some tens of periods.
+        /// Taps of the first estimate. By hand.
         first: usize = 400, FROM_ONE;
-        /// Most taps, and most unknowns of all inputs together: normal equations of this size take seconds.
+        /// Most taps, and most unknowns of all inputs together: by hand.
         most: usize = 1024, FROM_ONE;
         unknowns: usize = 1200, FROM_ONE;
         /// Part to which the slowest pole decays within the taps: one percent.
@@ -80,7 +80,7 @@ settings! {
 
     /// Orders of the first estimates of G.
     struct RealizationPolicy {
-        /// All orders up to this one are tried: a stage's dominant modes. By hand.
+        /// All orders up to this one are tried. By hand.
         small: usize = 6, FROM_ONE;
         /// The largest order that the singular values may suggest: with a larger one their flat tail is noise. By hand.
         largest: usize = 60, FROM_ONE;

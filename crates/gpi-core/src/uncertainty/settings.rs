@@ -1,7 +1,6 @@
 //! Every tolerance of the uncertainty and of the noise, with its meaning and the reason for its value.
 //!
-//! "By hand" means that nobody derived the value; the power table of docs/scoreboard.md and the coverage tests
-//! of `python/tests` show what all values together achieve.
+//! "By hand" means that nobody derived the value; docs/scoreboard.md shows what all values together achieve.
 
 use crate::Error;
 use crate::settings::{FROM_ONE, PART, POSITIVE, settings};
@@ -54,7 +53,7 @@ settings! {
 
     /// The autoregression of the residual.
     struct NoiseModelSettings {
-        /// The highest order: 30 samples of memory cover the noise of sensors and amplifiers. By hand.
+        /// The highest order. By hand.
         order: usize = 30, FROM_ONE;
         /// Samples for each coefficient, at least. By hand.
         samples: usize = 20, FROM_ONE;
@@ -88,7 +87,7 @@ settings! {
         apart: f64 = 6.0, POSITIVE;
         /// Times that such a difference must exceed those around it, which excludes jumps and edges. By hand.
         alone: f64 = 4.0, FROM_ONE;
-        /// Samples on either side that are compared: longer than the ringing of an edge's first half period. By hand.
+        /// Samples on either side that are compared: by hand.
         around: usize = 12, FROM_ONE;
         /// Of them, samples that may be wrong as well where outliers are counted. By hand.
         near: usize = 2, 0.0..=24.0;
