@@ -1,5 +1,6 @@
 //! No code branches on an effect's name: as a string it stands in the effect's own file and nowhere else.
 #![cfg(feature = "identify")]
+#![allow(clippy::unwrap_used)]
 
 use gpi_core::effects::CATALOGUE;
 use std::fs;
