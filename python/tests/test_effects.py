@@ -1,5 +1,7 @@
 """Every effect of the catalogue as a block of the chain, against its equation in plain NumPy."""
 
+import copy
+import functools
 import json
 
 import numpy as np
@@ -337,19 +339,55 @@ def test_derivatives_pass_through_the_effect(name):
         assert np.quantile(error, 0.97) < 1e-5 * np.abs(expected).max(), label
 
 
+# Where an effect's values stand in its JSON, in their order. What joins the sections of G has their columns.
+OWN_VALUES = {
+    "delay": ["samples"],
+    "amplifier-slew": ["limit"],
+    "rate-dependence": ["relative", "absolute", "law.exponent", "law.knee", "law.lag"],
+    "hysteresis-shape": [f"coefficients.{i}" for i in range(CURVES.size)],
+    "stiffness": [f"loops.{i}.drives.{j}" for i in range(2) for j in range(3)],
+    "output-nonlinearity": ["coefficients.0", "coefficients.1"],
+    "gain-drift": ["changes.0", "changes.1"],
+    "backlash": ["half_width"],
+    "drift": ["changes.0", "changes.1"],
+    "periodic-disturbance": ["frequency", "cosine", "sine"],
+}
+
+
+def scaled(parameters, place, factor):
+    """The parameters with the number at a place multiplied, and that number before."""
+    moved = copy.deepcopy(parameters)
+    *path, last = [int(key) if key.isdigit() else key for key in place.split(".")]
+    inside = functools.reduce(lambda part, key: part[key], path, moved)
+    before = inside[last]
+    inside[last] = factor * before
+    return moved, before
+
+
 @pytest.mark.parametrize("name", SMOOTH)
 def test_the_effect_has_columns_of_its_own(name):
+    """The Jacobian by the effect's own values against central differences of the simulation."""
     parameters, place = CASES[name]
     u = wander()
     model = with_effect(model_of(plant()), name=name, **parameters)
     found = gpi.sensitivities(model, gpi.Record(u, chain(u, **place), rate=RATE))
+    own = "section[2]" if name in ("creep", "linear-dynamics") else f"{name}.value"
+    labels = [label for label in found["names"] if label.startswith(own)]
+    columns = found["jacobians"][0][0][:, [list(found["names"]).index(label) for label in labels]]
+    assert labels and np.all(np.linalg.norm(columns, axis=0) > 0)
     if name in ("creep", "linear-dynamics"):
-        own = [label for label in found["names"] if label.startswith("section[2]")]
-    else:
-        own = [label for label in found["names"] if label.startswith(f"{name}.value")]
-    assert own
-    columns = found["jacobians"][0][0][:, [list(found["names"]).index(label) for label in own]]
-    assert np.all(np.linalg.norm(columns, axis=0) > 0)
+        return
+    assert len(labels) == len(OWN_VALUES[name])
+    for column, where in zip(columns.T, OWN_VALUES[name], strict=True):
+        there, values = zip(
+            *(scaled(parameters, where, factor) for factor in (1 + 1e-6, 1 - 1e-6)), strict=True
+        )
+        high, low = (with_effect(model_of(plant()), name=name, **moved).simulate(u) for moved in there)
+        # the estimated value of the knee is its logarithm
+        expected = (high - low) / (2e-6 * (1 if where == "law.knee" else values[0]))
+        error = np.abs(column - expected)
+        # the columns are differences over the effect's steps, within which plays may turn
+        assert np.quantile(error, 0.9) < 0.01 * np.abs(expected).max(), where
 
 
 @settings(max_examples=25, deadline=None)
