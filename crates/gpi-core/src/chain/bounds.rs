@@ -3,6 +3,7 @@
 use super::point::{Freedom, Point};
 use super::table::{Group, Table};
 use crate::Record;
+use crate::effects::Block;
 use crate::optimize::Bounds;
 
 /// What a value may change by.
@@ -52,7 +53,7 @@ impl Point {
                 half_widths(&values, widest)
             }
             Group::Effect { place } => {
-                let bounds = self.effects[place].block().map_or_else(Vec::new, |own| own.bounds());
+                let bounds = self.effects[place].block().map_or_else(Vec::new, Block::bounds);
                 let limits = bounds.into_iter().zip(values);
                 let limits = limits.map(|((low, high), value)| (low - value, high - value));
                 limits.map(|limits| if freedom.weights { limits } else { HELD }).collect()

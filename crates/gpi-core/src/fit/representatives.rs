@@ -71,7 +71,7 @@ pub(crate) fn representatives(
         .sections()
         .iter()
         .flat_map(Section::poles)
-        .map(|pole| pole.norm())
+        .map(num_complex::Complex::norm)
         .fold(0.0, f64::max);
     // no longer than what is scored
     let memory = (decayed.ln() / slowest.min(1.0 - 1e-9).ln()).ceil().max(0.0);
