@@ -63,7 +63,7 @@ def test_a_clean_record_lacks_nothing(seed):
     assert found.after["holdout"]["rms"] < 1.1 * plant.noise_std
     # a hundredth of the residual's variance may be left in its correlations
     assert found.verdict == "explained" or seed == 1
-    lacks_nothing = next(iter(in_words(found.to_dict()))).startswith("The model lacks nothing")
+    lacks_nothing = next(iter(in_words(found.to_dict()))).startswith("The model lacks no effect")
     assert lacks_nothing == (found.verdict == "explained")
 
 
@@ -147,7 +147,7 @@ def test_the_search_can_be_stopped_and_keeps_what_it_found():
     found = gpi.explain(record_of(plant.record(0)), progress=stop, order=3)
     assert found.interrupted
     assert found.effects == ["periodic-disturbance"]
-    assert next(iter(in_words(found.to_dict()))).startswith("Stopped before the search had finished")
+    assert next(iter(in_words(found.to_dict()))).startswith("The search was stopped before it was complete")
 
 
 def test_wrong_samples_are_told_however_few():

@@ -77,9 +77,9 @@ def test_an_envelope_that_ceases_to_rise_is_a_limit():
 @pytest.mark.parametrize(
     ("deadzones", "plays", "limits", "message"),
     [
-        (([1.0], [1.0]), ([0.0], [1.0]), None, "`envelope.weights` up to number 0 sum to a slope of 0e0"),
-        (([0.0], [1.0]), ([0.1], [1.0]), None, "`weights` up to number 0 sum to a slope of 0e0"),
-        (([0.0], [1.0]), ([0.0, 0.1], [1.0, -3.0]), None, "`weights` up to number 1 sum to a slope of -2e0"),
+        (([1.0], [1.0]), ([0.0], [1.0]), None, "`envelope.weights`: the elements up to index 0 sum to a slope of 0e0"),
+        (([0.0], [1.0]), ([0.1], [1.0]), None, "`weights`: the elements up to index 0 sum to a slope of 0e0"),
+        (([0.0], [1.0]), ([0.0, 0.1], [1.0, -3.0]), None, "`weights`: the elements up to index 1 sum to a slope of -2e0"),
         (([0.0], [1.0], "directional"), ([0.0], [1.0]), None, "only one-sided deadzones have an inverse"),
         (([0.0], [1.0]), ([0.0], [1.0]), (1.0, -1.0), "`limits` = 1, -1"),
         (([0.0], [1.0]), ([0.0], [1.0]), (np.nan, 1.0), "`limits` = NaN, 1"),
