@@ -46,12 +46,8 @@ impl FirStatistic {
     /// # Errors
     /// `taps`, `inputs` or `outputs` is zero, or there are more unknowns than [`FirStatistic::LARGEST`].
     pub fn new(taps: usize, inputs: usize, outputs: usize) -> Result<Self, Error> {
-        for (name, value, requirement) in [
-            ("taps", taps, "at least one tap is needed"),
-            ("inputs", inputs, "at least one input is needed"),
-            ("outputs", outputs, "at least one output is needed"),
-        ] {
-            Error::require(value > 0, name, value, requirement)?;
+        for (name, value) in [("taps", taps), ("inputs", inputs), ("outputs", outputs)] {
+            Error::require(value > 0, name, value, "at least one is needed")?;
         }
         let fits = taps.saturating_mul(inputs) <= Self::LARGEST;
         let requirement = format!("with {inputs} inputs at most {} fit", Self::LARGEST / inputs);
