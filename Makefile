@@ -5,6 +5,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 FIRMWARE := thumbv7em-none-eabihf
+# `cargo fmt` does not follow modules that a macro declares.
+EFFECTS := $(wildcard crates/gpi-core/src/effects/*.rs) python/tests/made_up_effect.rs
 
 TOOLS := $(VENV)/.tools-installed
 NATIVE := $(VENV)/.native-installed
@@ -17,7 +19,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # `make test` always runs its checks in the same order, also with `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python bench bench-peers docs figures monte-carlo tracking firmware-cost scoreboard blind-exam clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking firmware-cost scoreboard blind-exam clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -31,7 +33,7 @@ lint: lint-rust lint-python ## Run the format, lint and type checks of both lang
 
 lint-rust: ## Run rustfmt and clippy
 	$(call heading,Rust: format)
-	cargo fmt --all --check
+	cargo fmt --all --check -- $(EFFECTS)
 	$(call heading,Rust: lint)
 	PYO3_PYTHON=$(PYTHON) cargo clippy --workspace --all-targets -- -D warnings
 
@@ -62,6 +64,10 @@ lint-python: $(NATIVE) ## Run ruff, mypy, basedpyright and stubtest
 test-python: $(NATIVE) ## Run pytest
 	$(call heading,Python: tests)
 	$(BIN)/python -m pytest -n auto
+
+test-slow: $(NATIVE) ## The tests that build the workspace again: a made-up effect in a copy of it
+	$(call heading,Python: tests that build)
+	$(BIN)/python -m pytest -m builds -n 0
 
 docs: $(NATIVE) ## Build the documentation in out/site; its tutorial downloads a record or reads it from GPI_DATA_DIR
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going docs out/site

@@ -2,65 +2,39 @@
 //!
 //! Every effect acts in its own place of the chain, is simulated sample by sample, is saved in model files
 //! and has its parameters estimated together with the rest of the model. To add one, write its file (the
-//! constants that describe it, `proposals`, [`Block`] and the trait of its [`Place`]) and name it with its
-//! place in the catalogue below.
+//! constants that describe it, `proposals`, [`Block`] and the trait of its [`Place`]) and name the file, the
+//! type and the place in one line of the catalogue below.
 
-mod amplifier_slew;
-mod backlash;
 mod block;
-mod coloured_noise;
-mod covariate;
-mod creep;
-mod delay;
-mod drift;
-mod gain_drift;
-mod hysteresis_shape;
 mod inner_loop;
 mod knots;
-mod linear_dynamics;
 mod loop_signals;
-mod outliers;
-mod output_nonlinearity;
-mod periodic_disturbance;
 mod place;
 mod properties;
 mod proposal;
 mod quantity;
-mod rate_dependence;
 mod situation;
-mod stiffness;
 
-pub use amplifier_slew::AmplifierSlew;
-pub use backlash::Backlash;
 pub use block::Block;
-pub use coloured_noise::ColouredNoise;
-pub use covariate::Covariate;
-pub use creep::Creep;
-pub use delay::Delay;
-pub use drift::Drift;
-pub use gain_drift::GainDrift;
-pub use hysteresis_shape::HysteresisShape;
 pub use inner_loop::{InnerLoop, Law, Sees};
-pub use linear_dynamics::LinearDynamics;
-pub use outliers::Outliers;
-pub use output_nonlinearity::OutputNonlinearity;
-pub use periodic_disturbance::PeriodicDisturbance;
 pub use place::{
     Added, ClosedLoops, Coefficients, Finding, InputStage, Moment, OutputStage, ParallelSections,
     Place, PlaceMut, PlayCurves, PlayWidths, Slope, Stage,
 };
 pub use properties::{FreeOrder, SeparatedBy, Signature};
 pub use quantity::{Quantity, Units};
-pub use rate_dependence::{RateDependence, SpeedLaw};
-pub use stiffness::Stiffness;
+pub use rate_dependence::SpeedLaw;
 
 pub(crate) use creep::longest_lag;
 pub(crate) use proposal::Proposal;
 pub(crate) use situation::Situation;
 
-/// Declares [`Effect`], one variant an effect, and [`CATALOGUE`].
+/// Declares the module of each effect, [`Effect`] with one variant an effect, and [`CATALOGUE`].
 macro_rules! catalogue {
-    ($($effect:ident: $place:ident),* $(,)?) => {
+    ($($file:ident::$effect:ident: $place:ident),* $(,)?) => {
+        $(mod $file;
+        pub use $file::$effect;)*
+
         /// An effect of the catalogue with its parameters.
         #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(tag = "name", rename_all = "kebab-case")]
@@ -123,21 +97,21 @@ macro_rules! proposals {
 }
 
 catalogue! {
-    Delay: Input,
-    AmplifierSlew: Input,
-    RateDependence: Widths,
-    HysteresisShape: Curves,
-    LinearDynamics: Parallel,
-    Creep: Parallel,
-    Stiffness: Loops,
-    OutputNonlinearity: Output,
-    GainDrift: Output,
-    Backlash: Output,
-    Drift: Added,
-    PeriodicDisturbance: Added,
-    Covariate: Added,
-    Outliers: Finding,
-    ColouredNoise: Finding,
+    delay::Delay: Input,
+    amplifier_slew::AmplifierSlew: Input,
+    rate_dependence::RateDependence: Widths,
+    hysteresis_shape::HysteresisShape: Curves,
+    linear_dynamics::LinearDynamics: Parallel,
+    creep::Creep: Parallel,
+    stiffness::Stiffness: Loops,
+    output_nonlinearity::OutputNonlinearity: Output,
+    gain_drift::GainDrift: Output,
+    backlash::Backlash: Output,
+    drift::Drift: Added,
+    periodic_disturbance::PeriodicDisturbance: Added,
+    covariate::Covariate: Added,
+    outliers::Outliers: Finding,
+    coloured_noise::ColouredNoise: Finding,
 }
 
 /// What the catalogue says of one effect.
