@@ -77,9 +77,19 @@ def test_an_envelope_that_ceases_to_rise_is_a_limit():
 @pytest.mark.parametrize(
     ("deadzones", "plays", "limits", "message"),
     [
-        (([1.0], [1.0]), ([0.0], [1.0]), None, "`envelope.weights`: the elements up to index 0 sum to a slope of 0e0"),
+        (
+            ([1.0], [1.0]),
+            ([0.0], [1.0]),
+            None,
+            "`envelope.weights`: the elements up to index 0 sum to a slope of 0e0",
+        ),
         (([0.0], [1.0]), ([0.1], [1.0]), None, "`weights`: the elements up to index 0 sum to a slope of 0e0"),
-        (([0.0], [1.0]), ([0.0, 0.1], [1.0, -3.0]), None, "`weights`: the elements up to index 1 sum to a slope of -2e0"),
+        (
+            ([0.0], [1.0]),
+            ([0.0, 0.1], [1.0, -3.0]),
+            None,
+            "`weights`: the elements up to index 1 sum to a slope of -2e0",
+        ),
         (([0.0], [1.0], "directional"), ([0.0], [1.0]), None, "only one-sided deadzones have an inverse"),
         (([0.0], [1.0]), ([0.0], [1.0]), (1.0, -1.0), "`limits` = 1, -1"),
         (([0.0], [1.0]), ([0.0], [1.0]), (np.nan, 1.0), "`limits` = NaN, 1"),
@@ -93,7 +103,9 @@ def test_what_has_no_inverse_is_refused(deadzones, plays, limits, message):
 
 
 def test_states_that_no_input_brings_about_are_refused(cascade):
-    with pytest.raises(gpi.ParameterError, match="the output of play 1 differs by 5 from that of the next narrower play"):
+    with pytest.raises(
+        gpi.ParameterError, match="the output of play 1 differs by 5 from that of the next narrower play"
+    ):
         cascade.inverse_state([0.0, 0.0, 5.0, 0.0, 0.0])
     with pytest.raises(gpi.ParameterError, match="`state` has 2 elements, but 5 are needed"):
         cascade.inverse().run([1.0], [0.0, 0.0])
