@@ -218,7 +218,7 @@ def test_stops_keep_a_stable_stage_bounded(gain, seed):
         (stops_loop(inputs=[1.0]), "sees 1 inputs, but the dynamics have 2"),
         (stops_loop(widths=[0.1]), "1 half-widths, but 3 weights"),
         (stops_loop(widths=[0.1, 0.0, 0.3]), "half-widths of its stops must be positive"),
-        ({**cubic_loop(), "sees": {"output": 2}}, "channel 2 of 2"),
+        ({**cubic_loop(), "sees": {"output": 2}}, "sees output 2 of 2"),
     ],
 )
 def test_loops_that_do_not_fit_are_refused(loop, message):
