@@ -89,7 +89,10 @@ def test_every_pole_and_parameter_has_its_deviation(result: dict[str, Any]) -> N
     names = [row["name"] for row in result["parameters"]]
     assert len(set(names)) == len(names) and any(name.startswith("u.weights") for name in names)
     assert all(row["std"] is None or row["std"] >= 0 for row in result["parameters"])
-    assert result["outliers"] == 0 and result["robust"] is False and result["undetermined"] == []
+    assert result["outliers"] == 0 and result["robust"] is False
+    # whether a direction of this short record is unidentifiable hangs on the rounding of the machine
+    unidentifiable = {name for direction in result["undetermined"] for name, _ in direction}
+    assert unidentifiable <= {row["name"] for row in result["parameters"] if row["std"] is None}
 
 
 def test_poles_of_a_dead_time_have_no_deviation() -> None:

@@ -15,8 +15,8 @@ use pyo3::prelude::*;
 /// --------
 /// >>> u = np.random.default_rng(0).standard_normal(500)
 /// >>> response = gpi.fir(u, 2.0 * u, taps=3)
-/// >>> response.markov.shape, response.simulate([1.0, 0.0]).round(9).tolist()
-/// ((1, 1, 3), [2.0, 0.0])
+/// >>> response.markov.shape, response.simulate([1.0, 2.0]).round(9).tolist()
+/// ((1, 1, 3), [2.0, 4.0])
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Fir {
     pub(crate) fir: linear::Fir,
