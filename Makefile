@@ -35,9 +35,9 @@ lint-rust: ## Run rustfmt and clippy
 	$(call heading,Rust: format)
 	cargo fmt --all --check -- $(EFFECTS)
 	$(call heading,Rust: lint)
-	PYO3_PYTHON=$(PYTHON) cargo clippy --workspace --all-targets -- -D warnings
+	PYO3_PYTHON=$(PYTHON) cargo clippy --release --workspace --all-targets -- -D warnings
 
-test-rust: ## Build for firmware; run unit tests, documentation tests and the benchmarks in test mode
+test-rust: ## Build for firmware; run unit tests and documentation tests
 	$(call heading,Rust: build without std for $(FIRMWARE))
 	@if [ -d "$$(rustc --print target-libdir --target $(FIRMWARE))" ] || rustup target add $(FIRMWARE); then \
 		cargo build -p gpi-core --no-default-features --target $(FIRMWARE); \
@@ -45,11 +45,9 @@ test-rust: ## Build for firmware; run unit tests, documentation tests and the be
 		echo "note: skipped, because the Rust target $(FIRMWARE) cannot be added here"; \
 	fi
 	$(call heading,Rust: tests)
-	cargo test --workspace --exclude gpi-py
+	PYO3_PYTHON=$(PYTHON) cargo test --release --workspace --exclude benches
 	$(call heading,Rust: tests without default features)
 	cargo test -p gpi-core --no-default-features
-	$(call heading,Rust: benchmarks in test mode)
-	cargo test --benches
 
 lint-python: $(NATIVE) ## Run ruff, mypy, basedpyright and stubtest
 	$(call heading,Python: lint and format)
@@ -63,11 +61,13 @@ lint-python: $(NATIVE) ## Run ruff, mypy, basedpyright and stubtest
 
 test-python: $(NATIVE) ## Run pytest
 	$(call heading,Python: tests)
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist loadgroup
 
-test-slow: $(NATIVE) ## The tests that build the workspace again: a made-up effect in a copy of it
-	$(call heading,Python: tests that build)
-	$(BIN)/python -m pytest -m builds -n 0
+test-slow: $(NATIVE) ## Run the tests that take minutes, and the benchmarks in test mode
+	$(call heading,Rust: benchmarks in test mode)
+	cargo test --release --benches
+	$(call heading,Python: slow tests)
+	$(BIN)/python -m pytest -m slow -n auto
 
 docs: $(NATIVE) ## Build the documentation in out/site; its tutorial downloads a record or reads it from GPI_DATA_DIR
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going docs out/site

@@ -27,7 +27,7 @@ NEIGHBOUR = "    output_nonlinearity::OutputNonlinearity: Output,\n"
 LINE = "    made_up_effect::MadeUpEffect: Output,\n"
 
 pytestmark = [
-    pytest.mark.builds,
+    pytest.mark.slow,
     pytest.mark.skipif(shutil.which("cargo") is None, reason="NO CARGO: the made-up effect is not built"),
     pytest.mark.skipif(sys.platform != "linux", reason="NOT LINUX: cargo alone does not link the bindings"),
 ]

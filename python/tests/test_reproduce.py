@@ -28,12 +28,14 @@ def found() -> Paper:
     return paper()
 
 
+@pytest.mark.xdist_group("paper")
 def test_the_plant_is_the_one_printed(found: Paper) -> None:
     numerator, denominator = found.system.to_transfer_function()
     np.testing.assert_allclose(np.ravel(numerator)[-3:], [0.255977, 0.0243899, 0.134935], rtol=1e-5)
     np.testing.assert_allclose(np.ravel(denominator)[:3], [1.0, -0.574648, 0.494901], rtol=1e-5)
 
 
+@pytest.mark.xdist_group("paper")
 @pytest.mark.parametrize("name", REFERENCE)
 def test_figures_are_within_two_percent(name: str, found: Paper) -> None:
     [reading] = [one for one in found.readings if one.name == name]
@@ -46,6 +48,7 @@ def test_figures_are_within_two_percent(name: str, found: Paper) -> None:
         assert realisation.v_error == pytest.approx(v, rel=0.02)
 
 
+@pytest.mark.xdist_group("paper")
 @pytest.mark.parametrize("name", ["one-sided", "directional"])
 def test_the_refinement_removes_the_bias(name: str, found: Paper) -> None:
     [reading] = [one for one in found.readings if one.name == name]
