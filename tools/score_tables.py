@@ -45,13 +45,20 @@ def singles(results: Iterable[Result]) -> Table:
     for result in results:
         if len(result.wanted) <= 1:
             wanted = OUTSIDE if result.is_outside else result.wanted[0] if result.wanted else "none"
-            counts.setdefault(wanted, Counter())[", ".join(sorted(result.found)) or "none"] += 1
+            is_right = result.is_right()
+            found = right_of(wanted) if is_right else ", ".join(sorted(result.found)) or "none"
+            counts.setdefault(wanted, Counter())[found] += 1
     rows = []
     for wanted, found in sorted(counts.items()):
-        right = "none" if wanted == OUTSIDE else wanted
+        right = right_of(wanted)
         others = "; ".join(f"{count} x {name}" for name, count in found.most_common() if name != right)
         rows.append((wanted, f"{found[right]} of {found.total()}", others))
     return Table("Single effects", ("wanted", "right", "found instead"), rows)
+
+
+def right_of(wanted: str) -> str:
+    """Return the right answer of a row: none where the effect is outside the catalogue."""
+    return "none" if wanted == OUTSIDE else wanted
 
 
 def by_number(results: Iterable[Result]) -> Table:
@@ -111,7 +118,7 @@ def summary(results: Sequence[Result]) -> Table:
     rows = [("right", f"{len(right)} of {len(results)}")]
     for name, is_outside in (("lack nothing", False), ("have an effect outside the catalogue", True)):
         clean = [result for result in results if not result.wanted and result.is_outside == is_outside]
-        alarms = sum(bool(result.found) for result in clean)
+        alarms = sum(result.has_false() for result in clean)
         rows.append((f"false alarms on stages that {name}", f"{alarms} of {len(clean)}"))
     if right:
         ratios = np.array([result.after for result in right])

@@ -1,7 +1,7 @@
 """Print how often `explain` names the right effects, and the error before and after.
 
-The records are those with labels under `blind/dev` of the data folder (`GPI_DATA_DIR`, else `../shared`), and
-plants of the tests' simulator that are drawn at random. `python tools/scoreboard.py --help` lists the
+The records are those with labels under `blind/dev` and `blind/foreign` of the data folder (`GPI_DATA_DIR`, else
+`../shared`), and plants of the tests' simulator that are drawn at random. `python tools/scoreboard.py --help` lists the
 options.
 """
 
@@ -21,9 +21,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "tests")
 
 import plants  # noqa: E402  the simulator that the tests use
 import score_tables  # noqa: E402
-from data_folder import DEV  # noqa: E402
+from data_folder import DEV, FOREIGN  # noqa: E402
 from gpi_hammerstein.files import write_atomically  # noqa: E402
-from scores import Result, labelled, simulated  # noqa: E402
+from scores import Result, foreign, labelled, simulated  # noqa: E402
 
 # Effects of the simulated plants. G's order and delay are left out: here, the declared model contains them.
 SINGLE = [name for name in plants.CATALOGUE if name not in ("delay", "linear-dynamics")]
@@ -41,7 +41,8 @@ class Kept:
         self.results: dict[str, Result] = {}
         if path is not None and path.exists():
             for name, values in json.loads(path.read_text()).items():
-                names = {key: tuple(values[key]) for key in ("wanted", "found")}
+                lists = ("wanted", "found", "may")
+                names = {key: tuple(values[key]) for key in lists if values.get(key) is not None}
                 self.results[name] = Result(**{**values, **names})
 
     @staticmethod
@@ -81,9 +82,10 @@ def line(result: Result) -> str:
 
 def mixed_work(arguments: argparse.Namespace) -> Iterator[Job]:
     """Yield labelled records, and plants with no, one, two or three effects or one outside the catalogue."""
-    if arguments.records and (DEV / "labels.json").exists():
-        for name in sorted(json.loads((DEV / "labels.json").read_text())):
-            yield labelled, (DEV, name)
+    for function, folder in ((labelled, DEV), (foreign, FOREIGN)) if arguments.records else ():
+        labels = folder / "labels.json"
+        names = sorted(json.loads(labels.read_text())) if labels.exists() else []
+        yield from ((function, (folder, name)) for name in names if (arguments.only or "") in name)
     random = np.random.default_rng(arguments.seed)
     for number in range(arguments.plants):
         kind = number % 10
@@ -139,6 +141,7 @@ def main() -> None:
     parser.add_argument(
         "--no-records", dest="records", action="store_false", help="leave out the labelled records"
     )
+    parser.add_argument("--only", metavar="TEXT", help="only the labelled records whose name contains this")
     parser.add_argument(
         "--effects",
         nargs="+",

@@ -11,7 +11,7 @@ import pytest
 
 DATA = Path(os.environ.get("GPI_DATA_DIR") or Path(__file__).resolve().parents[3] / "shared")
 MEASURED = DATA / "measured"
-DEV, EXAM = DATA / "blind" / "dev", DATA / "blind" / "exam"
+DEV, EXAM, FOREIGN = (DATA / "blind" / name for name in ("dev", "exam", "foreign"))
 
 needs_measured = pytest.mark.skipif(
     not MEASURED.is_dir(), reason=f"NO MEASURED RECORDS in {DATA}: set GPI_DATA_DIR to run these tests"

@@ -24,6 +24,7 @@ NAMES = [
     "direction",
     "amplitude",
     "trend",
+    "prediction",
     "level-to-level",
     "higher-order",
     "outliers",

@@ -25,6 +25,7 @@ PICTURES = {
     "amplitude": "residual_time",
     "level-to-level": "residual_time",
     "trend": "residual_time",
+    "prediction": "residual_over_input",
     "higher-order": "residual_time",
     "outliers": "residual_time",
 }

@@ -27,6 +27,11 @@ pub trait Block {
         None
     }
 
+    /// Whether any machine can have these values. What is not possible is never named.
+    fn is_possible(&self) -> bool {
+        true
+    }
+
     /// Whether a machine can have these values and a record of `duration` seconds can show them.
     fn is_plausible(&self, _duration: f64) -> bool {
         true

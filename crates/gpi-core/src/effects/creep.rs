@@ -89,6 +89,12 @@ impl Block for Creep {
         times.chain(self.gains.iter().map(|_| 1e-3)).collect()
     }
 
+    /// Creep follows the motion, and is smaller: the gains add up to more than 0 and less than 1.
+    fn is_possible(&self) -> bool {
+        let total: f64 = self.gains.iter().sum();
+        total > 0.0 && total < 1.0
+    }
+
     /// All lags relax in one direction, and none is slower than the record, which would be a trend.
     fn is_plausible(&self, duration: f64) -> bool {
         self.gains.windows(2).all(|pair| pair[0] * pair[1] >= 0.0)

@@ -8,7 +8,7 @@
 use super::policy::score::RANK;
 use crate::chain::free_run::Signals;
 use crate::chain::point::{Freedom, Point};
-use crate::chain::table::Table;
+use crate::chain::table::{Group, Table};
 use crate::effects::Situation;
 use crate::fit::problem::Estimation;
 use crate::optimize::{LeastSquares, Linearization, Loss};
@@ -37,10 +37,22 @@ impl<'a> Base<'a> {
         freedom: Freedom,
         loss: &'a Loss,
     ) -> Result<Self, Error> {
+        Self::of(point, record, freedom, loss, |_| true)
+    }
+
+    /// Linearizes a fitted point; only the groups of parameters that `takes` accepts are what the model can do.
+    pub(crate) fn of(
+        point: &'a Point,
+        record: &'a Record,
+        freedom: Freedom,
+        loss: &'a Loss,
+        takes: impl Fn(Group) -> bool,
+    ) -> Result<Self, Error> {
         let problem = Estimation::new(point, record, freedom, loss);
         let linearization = problem.linearize(point, &mut || Ok(()))?;
-        let free = problem.bounds(point).free();
-        let table = problem.table;
+        let table = problem.table.clone();
+        let mut free = problem.bounds(point).free();
+        free.retain(|&unknown| table.at(unknown).is_some_and(|(group, _)| takes(group)));
         let gram = &linearization.gram;
         let scale: Vec<f64> =
             free.iter().map(|&i| gram[(i, i)].sqrt().max(f64::MIN_POSITIVE)).collect();

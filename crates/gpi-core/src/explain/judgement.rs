@@ -11,14 +11,15 @@
 //!    (Bonferroni's correction, since a chi-square tail falls as `exp(-x / 2)`); `p N` asks for a part p of the squares.
 //!    Autocorrelated residuals are worth fewer samples than they have: with a factor kappa, by which the covariance
 //!    of the parameters exceeds that for white noise, the first two terms count kappa times.
-//! 3. *Confirmed*: the squares of the held-out blocks fall, see [`is_confirmed`].
+//! 3. *Confirmed*: the squares of the held-out blocks fall, see [`is_confirmed`], and by nearly as large a part as those of
+//!    the training data.
 //! 4. *Substantial*: far from the noise a bad fit resembles many effects a little, so a large part of the training
 //!    and of the held-out squares must go. This is not asked near the noise, of an effect whose signature no bad fit
 //!    has, or of more of a driven effect that the model has already.
 //!
 //! Of the accepted trials the one with the largest deviance beyond its threshold is taken. Trials whose deviance lies
-//! within that threshold of its own explain the same: of these, one with plausible parameters is preferred, and the
-//! others are reported as confounded.
+//! within that threshold of its own explain the same: of these, one with plausible parameters is preferred, of functions of
+//! time one that is added to the output, and the others are reported as confounded.
 
 use super::policy::JudgementPolicy;
 
@@ -88,6 +89,14 @@ pub(super) struct Evidence<'a> {
     pub is_more: bool,
     /// Whether its parameters are such as a machine can have.
     pub is_plausible: bool,
+    /// Whether another measured column explains it.
+    pub is_measured: bool,
+    /// Whether it is a slow function of time.
+    pub is_slow: bool,
+    /// Whether it is added to the output, and does nothing else.
+    pub is_added: bool,
+    /// Why its examination ended without a name, if so.
+    pub doubt: Option<Refusal>,
 }
 
 /// Why a trial is not accepted, or not taken.
@@ -101,6 +110,16 @@ pub(super) enum Refusal {
     Unconfirmed,
     /// Far from the noise, too small a part of the residual.
     Insubstantial,
+    /// No machine has such values.
+    Impossible,
+    /// The rest of the model can do the same.
+    NotItsOwn,
+    /// It does not predict gaps between its knots.
+    Gaps,
+    /// Too large a part of the output for a model that is far from the noise.
+    TooLarge,
+    /// The model without it, fitted from where the trial ended, explains as much.
+    LongerFit,
     /// Another effect explains as much.
     Confounded,
     /// Another effect explains more.
@@ -117,6 +136,13 @@ impl Refusal {
             Self::Insubstantial => {
                 "removes too small a part of the residual, which is far above the noise".to_owned()
             }
+            Self::Impossible => "would need values that no machine has".to_owned(),
+            Self::NotItsOwn => "does nothing that the rest of the model cannot do".to_owned(),
+            Self::Gaps => "does not predict gaps between its knots as well as it fits".to_owned(),
+            Self::TooLarge => {
+                "would be a large part of the output, and the model would still be far from the noise".to_owned()
+            }
+            Self::LongerFit => "gains no more than a longer fit of the model without it".to_owned(),
             Self::Confounded => format!("explains as much as {taken}"),
             Self::Inferior => format!("explains less than {taken}"),
         }
@@ -125,11 +151,13 @@ impl Refusal {
 
 /// Whether a trial is accepted by itself.
 pub(super) fn judge(trial: &Evidence, policy: &JudgementPolicy) -> Result<(), Refusal> {
-    if !trial.is_driven {
+    if let Some(doubt) = trial.doubt {
+        Err(doubt)
+    } else if !trial.is_driven {
         Err(Refusal::Undriven)
     } else if trial.deviance <= trial.threshold {
         Err(Refusal::Insignificant)
-    } else if !is_confirmed(trial.held_out, policy) {
+    } else if !is_confirmed(trial.held_out, policy) || !is_seen(trial, policy) {
         Err(Refusal::Unconfirmed)
     } else if !is_weighty(trial, policy) {
         Err(Refusal::Insubstantial)
@@ -138,14 +166,30 @@ pub(super) fn judge(trial: &Evidence, policy: &JudgementPolicy) -> Result<(), Re
     }
 }
 
-/// The place of the trial to take, of those that are sorted by their deviance beyond the threshold.
-pub(super) fn choose(trials: &[Evidence], policy: &JudgementPolicy) -> Option<usize> {
+/// The place of the trial to take, of those that are sorted by their deviance beyond the threshold. Another measured
+/// column is taken instead of a slow function of time where its held-out error is no larger than `measured` times.
+pub(super) fn choose(
+    trials: &[Evidence],
+    measured: f64,
+    policy: &JudgementPolicy,
+) -> Option<usize> {
     let is_accepted = |trial: &Evidence| judge(trial, policy).is_ok();
     let best = trials.iter().position(is_accepted)?;
     let is_as_good = |trial: &Evidence| {
         explains_as_much(trial, &trials[best]) && is_accepted(trial) && trial.is_plausible
     };
-    Some(trials.iter().position(is_as_good).unwrap_or(best))
+    let measured_instead = |trial: &Evidence| {
+        let rms = |trial: &Evidence| trial.held_out[1].iter().sum::<f64>().sqrt();
+        let is_near = rms(trial) < measured * rms(&trials[best]);
+        trials[best].is_slow && trial.is_measured && is_near && is_accepted(trial)
+    };
+    // of functions of time, one that is added assumes least
+    let is_simpler = |trial: &Evidence| {
+        trials[best].is_slow && trial.is_slow && trial.is_added && is_as_good(trial)
+    };
+    let instead = trials.iter().position(measured_instead);
+    let instead = instead.or_else(|| trials.iter().position(is_simpler));
+    Some(instead.or_else(|| trials.iter().position(is_as_good)).unwrap_or(best))
 }
 
 /// Why a trial was not taken, with the one that was taken if any.
@@ -156,6 +200,7 @@ pub(super) fn refusal(
 ) -> Refusal {
     match taken {
         _ if !trial.is_driven => Refusal::Undriven,
+        Some(_) if trial.doubt.is_some() => trial.doubt.unwrap_or(Refusal::Inferior),
         Some(taken) if explains_as_much(trial, taken) => Refusal::Confounded,
         Some(_) => Refusal::Inferior,
         None => judge(trial, policy).err().unwrap_or(Refusal::Inferior),
@@ -165,6 +210,13 @@ pub(super) fn refusal(
 /// Whether the deviance reaches that of another one up to the other's threshold.
 fn explains_as_much(trial: &Evidence, other: &Evidence) -> bool {
     trial.deviance > other.deviance - other.threshold
+}
+
+/// Whether the held-out squares fall by nearly as large a part as the training squares.
+fn is_seen(trial: &Evidence, policy: &JudgementPolicy) -> bool {
+    let part = |[before, after]: [f64; 2]| 1.0 - after / before.max(f64::MIN_POSITIVE);
+    let held_out = trial.held_out.map(|blocks| blocks.iter().sum());
+    part(held_out) >= policy.seen * part(trial.squares)
 }
 
 /// Whether a trial is substantial, or need not be.
@@ -225,6 +277,10 @@ mod tests {
             is_unique: false,
             is_more: false,
             is_plausible: true,
+            is_measured: false,
+            is_slow: false,
+            is_added: false,
+            doubt: None,
         }
     }
 
@@ -267,14 +323,24 @@ mod tests {
         let best = Evidence { is_plausible: false, ..sound() };
         let equal = Evidence { deviance: 470.0, ..sound() };
         let weaker = Evidence { deviance: 450.0, ..sound() };
-        assert_eq!(choose(&[best, equal, weaker], &policy), Some(1));
-        assert_eq!(choose(&[best, weaker], &policy), Some(0));
+        assert_eq!(choose(&[best, equal, weaker], 1.05, &policy), Some(1));
+        assert_eq!(choose(&[best, weaker], 1.05, &policy), Some(0));
         let unconfirmed = Evidence { held_out: [&BEFORE, &BEFORE], ..best };
-        assert_eq!(choose(&[unconfirmed, weaker], &policy), Some(1));
-        assert_eq!(choose(&[unconfirmed], &policy), None);
+        assert_eq!(choose(&[unconfirmed, weaker], 1.05, &policy), Some(1));
+        assert_eq!(choose(&[unconfirmed], 1.05, &policy), None);
         assert_eq!(refusal(&equal, Some(&best), &policy), Refusal::Confounded);
         assert_eq!(refusal(&weaker, Some(&best), &policy), Refusal::Inferior);
         assert_eq!(refusal(&unconfirmed, None, &policy), Refusal::Unconfirmed);
+        let drift = Evidence { is_slow: true, ..sound() };
+        let measured = Evidence { is_measured: true, ..weaker };
+        assert_eq!(choose(&[drift, weaker, measured], 1.05, &policy), Some(2));
+        assert_eq!(choose(&[sound(), measured], 1.05, &policy), Some(0));
+        let gain_drift = Evidence { is_slow: true, ..sound() };
+        let added = Evidence { is_slow: true, is_added: true, ..equal };
+        assert_eq!(choose(&[gain_drift, added], 1.05, &policy), Some(1));
+        let doubted = Evidence { doubt: Some(Refusal::NotItsOwn), ..sound() };
+        assert_eq!(choose(&[doubted, weaker], 1.05, &policy), Some(1));
+        assert_eq!(refusal(&doubted, None, &policy), Refusal::NotItsOwn);
         let decay = Evidence { is_driven: false, ..equal };
         assert_eq!(refusal(&decay, Some(&best), &policy), Refusal::Undriven);
     }
@@ -301,9 +367,9 @@ mod tests {
         assert!((of(500.0, false, false).threshold(&policy) - white(500.0)).abs() < 1e-12);
         // of many values a part of the squares is asked for
         let usual = of(1e5, false, false);
-        assert!((usual.threshold(&policy) - 4000.0).abs() < 1e-9);
-        assert!(usual.depends_on_autocorrelation(4001.0, &policy));
-        assert!(!usual.depends_on_autocorrelation(3999.0, &policy));
+        assert!((usual.threshold(&policy) - 2000.0).abs() < 1e-9);
+        assert!(usual.depends_on_autocorrelation(2001.0, &policy));
+        assert!(!usual.depends_on_autocorrelation(1999.0, &policy));
         let raised = usual.threshold_of_autocorrelated(200.0, &policy);
         assert!((raised - 200.0 * white(1e5)).abs() < 1e-9);
         assert_eq!(usual.threshold_of_autocorrelated(1.0, &policy), usual.threshold(&policy));

@@ -93,7 +93,12 @@ fn memory(
         NoiseMethod::HighFrequencyResidual => policy.loud * span,
         _ => policy.louder * floor.rms[output],
     };
-    if own > loudest || kurtosis(residuals, &state.prepared.record, output) > policy.kurtosis {
+    // what is predictable from its past alone leaves innovations that are as fast as the noise
+    let is_fast = innovation > policy.innovation * floor.rms[output];
+    if is_fast
+        || own > loudest
+        || kurtosis(residuals, &state.prepared.record, output) > policy.kurtosis
+    {
         return Ok(None);
     }
     let falls = |before: f64, after: f64| after < (1.0 - policy.predicted) * before;

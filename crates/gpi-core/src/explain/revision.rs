@@ -7,7 +7,7 @@ use super::trial::{fitted, measured, start};
 use crate::Error;
 use crate::Progress;
 use crate::chain::point::Point;
-use crate::effects::{CATALOGUE, Effect, Entry, FreeOrder, Signature};
+use crate::effects::{CATALOGUE, Effect, Entry, FreeOrder, Place, Signature};
 use crate::fit::memory::Memory;
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::fit::preparation::rescale;
@@ -36,7 +36,11 @@ pub(super) fn drop_superfluous(state: &mut SearchState, progress: Progress) -> R
     let mut place = 0;
     while state.point.effects.len() > 1 && place < state.point.effects.len() {
         let name = state.point.effects[place].name();
-        if name == newest.entry.name {
+        // a free function of time does not replace what was measured
+        let is_measured = matches!(state.point.effects[place].place(), Place::Added(_))
+            && state.point.effects[place].entry().driven;
+        let keeps = is_measured && newest.entry.signature == Signature::SlowInTime;
+        if name == newest.entry.name || keeps {
             place += 1;
             continue;
         }
@@ -114,6 +118,37 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
         {
             let dropped = vec![slow.name];
             state.point = trial.point.clone();
+            state.add(Addition { trial, others: Vec::new(), dropped })?;
+        }
+    }
+    Ok(())
+}
+
+/// Replaces a slow function of time by one that acts elsewhere where that explains more, now that the rest is known.
+pub(super) fn exchange_slow(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+    if state.additions.len() < 2 {
+        return Ok(());
+    }
+    let is_slow = |entry: &Entry| entry.signature == Signature::SlowInTime;
+    for place in 0..state.point.effects.len() {
+        let own = state.point.effects[place].entry();
+        let is_other = |entry: &&Entry| is_slow(entry) && !state.has(entry);
+        let others: Vec<&'static Entry> =
+            state.setup.allowed.iter().copied().filter(is_other).collect();
+        if !is_slow(own) || others.is_empty() {
+            continue;
+        }
+        let without = state.point.without_effect(place);
+        let best = scored_beside(state, &without, &others, progress)?.into_iter().next();
+        let Some(Ranked { entry, score, .. }) = best else { continue };
+        let gain = score.gain;
+        let start = start(state, &without, score)?;
+        let (fitted, options) = fitted(state, start, entry, progress)?;
+        let most = (1.0 - state.setup.policy.revision.other_side) * state.cost;
+        if fitted.linearization.cost < most {
+            let trial = measured(state, &without, entry, fitted, options, gain, progress)?;
+            state.point = trial.point.clone();
+            let dropped = vec![own.name];
             state.add(Addition { trial, others: Vec::new(), dropped })?;
         }
     }

@@ -1,14 +1,18 @@
 //! The closed loop: score candidates, fit the best few jointly, keep what the held-out data confirm.
 
+use super::examination::{doubt_at_the_end, examine};
 use super::grid::refine_grids;
 use super::judgement::{Evidence, Refusal, choose, refusal};
-use super::ranking::{ranked, scored_beside};
-use super::revision::{drop_superfluous, join_modes, prefer_driven, rearrange, shed_lags};
+use super::ranking::{Ranked, ranked, scored_beside};
+use super::revision::{
+    drop_superfluous, exchange_slow, join_modes, prefer_driven, rearrange, shed_lags,
+};
 use super::setup::SearchSetup;
 use super::state::{Addition, Rejected, SearchState, Trial};
 use super::trial::{trial, trials};
 use crate::Error;
-use crate::effects::{Entry, FreeOrder, Signature};
+use crate::effects::{Entry, FreeOrder, Signature, Stage};
+use crate::fit::minimize::Fitted;
 use crate::progress::Progress;
 
 /// Adds effects until nothing more is confirmed.
@@ -18,16 +22,46 @@ pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Err
             break;
         }
     }
-    prefer_driven(state, progress)
+    prefer_driven(state, progress)?;
+    exchange_slow(state, progress)?;
+    examine_all(state, progress)
+}
+
+/// Examines every effect once more, now that the model is whole, and drops what does not pass.
+fn examine_all(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+    let mut place = 0;
+    while place < state.point.effects.len() {
+        let Some(why) = doubt_at_the_end(state, place, progress)? else {
+            place += 1;
+            continue;
+        };
+        let name = state.point.effects[place].name();
+        let holdout_rms = state.setup.holdout_rms(&state.held_out(&state.point)?);
+        let without = state.point.without_effect(place);
+        let fitted = state.fit(without, &state.setup.options, "without it", progress)?;
+        (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
+        let why = why.in_words("the model");
+        state.last.push(Rejected { effect: name, holdout_rms, why, confounded_with: Vec::new() });
+        if let Some(own) = state.additions.iter().rposition(|one| one.trial.entry.name == name) {
+            state.additions.remove(own);
+        }
+        state.repair()?;
+        // the others may have depended on it
+        place = 0;
+    }
+    Ok(())
 }
 
 /// One round: takes the best effect, if any is confirmed; says whether the model became another.
 fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let policy = &state.setup.policy.ranking;
     let mut best = ranked(state, progress)?;
-    // A strong candidate is fitted first: a finer grid would partly replace it.
-    let most = best.iter().map(|one| one.score.gain).fold(0.0, f64::max);
-    if most < policy.strong && !state.is_rich && refine_grids(state, progress)? {
+    // A strong candidate is fitted first: a finer grid would partly replace it. A function of time follows whatever a
+    // coarse grid lacks, so it waits for the finer one.
+    let is_slow = |entry: &Entry| entry.signature == Signature::SlowInTime;
+    let is_strong = |one: &Ranked| one.score.gain >= policy.strong && !is_slow(one.entry);
+    let most = best.iter().max_by(|a, b| a.score.gain.total_cmp(&b.score.gain));
+    if !most.is_some_and(is_strong) && !state.is_rich && refine_grids(state, progress)? {
         best = ranked(state, progress)?;
     }
     let hopeless = policy.hopeless * state.setup.policy.judgement.least;
@@ -42,9 +76,25 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let before = state.held_out(&state.point)?;
     let noise = state.noise_squares()?;
     let evidence = |trial| evidence(state, trial, noise, &before);
-    let evidences: Vec<Evidence> = trials.iter().map(evidence).collect();
+    let mut evidences: Vec<Evidence> = trials.iter().map(evidence).collect();
     let judgement = &state.setup.policy.judgement;
-    let taken = choose(&evidences, judgement);
+    let measured = state.setup.policy.examination.measured_instead;
+    let mut better: Option<Fitted> = None;
+    let taken = loop {
+        let Some(place) = choose(&evidences, measured, judgement) else { break None };
+        if is_slow(trials[place].entry) && !state.is_rich && refine_grids(state, progress)? {
+            return Ok(true);
+        }
+        let examined = examine(state, &trials[place], &evidences[place], progress)?;
+        if examined.refusal.is_none() {
+            break Some(place);
+        }
+        evidences[place].doubt = examined.refusal;
+        let is_better = |one: &Fitted| {
+            better.as_ref().is_none_or(|known| one.linearization.cost < known.linearization.cost)
+        };
+        better = examined.without.filter(is_better).or(better);
+    };
     let reject = |place: usize| {
         let refusal = refusal(&evidences[place], taken.map(|taken| &evidences[taken]), judgement);
         rejected(state.setup, &trials[place], refusal, taken.map(|taken| &trials[taken]))
@@ -52,7 +102,9 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let others = (0..trials.len()).filter(|&place| Some(place) != taken).map(reject).collect();
     let Some(taken) = taken else {
         state.last = others;
-        return Ok(false);
+        let Some(better) = better else { return Ok(false) };
+        (state.point, state.cost) = (better.point, better.linearization.cost);
+        return Ok(true);
     };
     let trial = trials.swap_remove(taken);
     state.point = trial.point.clone();
@@ -84,6 +136,10 @@ fn evidence<'a>(
         is_unique: trial.entry.signature == Signature::Unique,
         is_more: state.is_more(trial.entry),
         is_plausible: state.is_plausible(&trial.point),
+        is_measured: trial.entry.driven && trial.entry.stage == Stage::Added,
+        is_slow: trial.entry.signature == Signature::SlowInTime,
+        is_added: trial.entry.stage == Stage::Added,
+        doubt: None,
     }
 }
 

@@ -13,7 +13,8 @@ use pyo3::types::PyDict;
 /// The residual is ``e(k) = y(k) - y_hat(k)``. y_hat is simulated from u alone, with the model's effects and the record's
 /// covariates. The tests of each output are ``mean``; ``whiteness`` (Ljung and Box); ``lines`` of the spectrum; dependence
 /// of e on ``past-input``, ``past-intermediate`` (v), ``level``, ``speed``, ``direction``, ``amplitude`` and time
-/// (``trend``); dependence on the past input that changes with the input's amplitude (``level-to-level``); the same
+/// (``trend``); the part of e, whitened by its own past, that a regression on lags, speeds and plays of u and y_hat
+/// predicts on blocks of time that it was not fitted to (``prediction``); dependence on the past input that changes with the input's amplitude (``level-to-level``); the same
 /// dependences of the square of e (``higher-order``); and ``outliers``. The significance level of each test is at most
 /// 0.01 divided by the number of tests. The statistic of a dependence is ``t = sum_b g_b / sqrt(sum_b g_b^2)``, where g_b is
 /// the product of e and a regressor, summed over block b of time. It is robust to autocorrelated noise whose correlation

@@ -55,6 +55,11 @@ impl ScaledSignals {
         }
     }
 
+    /// The inputs and the simulated output.
+    pub(super) fn all(&self) -> Vec<&ScaledSignal> {
+        self.inputs.iter().chain([&self.output]).collect()
+    }
+
     /// All families, those of the inputs with the regressors of every input.
     pub(super) fn families<'a>(&'a self, policy: &'a ResidualPolicy) -> Vec<Family<'a>> {
         let x = &self.output.level;

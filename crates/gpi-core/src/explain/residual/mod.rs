@@ -11,7 +11,8 @@ mod lines;
 mod mean;
 mod outcome;
 mod policy;
-mod significance;
+mod prediction;
+pub(super) mod significance;
 #[cfg(test)]
 mod simulated;
 mod whiteness;
@@ -136,6 +137,7 @@ fn analyse(measured: &Compared) -> Vec<ResidualTest> {
         for family in &families {
             tests.push(independence::independence(given, output, family, significance));
         }
+        tests.push(prediction::prediction(given, output, &signals.all()));
         tests.push(level_to_level::level_to_level(given, output, &signals, significance));
         let present = families.into_iter().filter(|family| !family.name.starts_with("past-"));
         let name = "higher-order";

@@ -16,8 +16,8 @@ pub struct ResidualTest {
     ///
     /// It is raised where that would be of no practical size: for `whiteness` to a hundredth of the
     /// residual's variance in its correlations; for the statistics t of `mean`, `level-to-level`,
-    /// `higher-order` and all dependences, whose regressors share the probability, to 4. `outliers`
-    /// allows two.
+    /// `higher-order` and all dependences, whose regressors share the probability, to 4; for `prediction` it is the
+    /// part of the variance that the input may predict. `outliers` allows two.
     pub threshold: f64,
     /// The probability, at most, that a residual without structure gives a statistic this large or larger; all
     /// regressors or lines of this one test are allowed for, the other tests are not.
@@ -36,8 +36,11 @@ impl ResidualTest {
 /// Name of the test of autocorrelation.
 pub(in crate::explain) const WHITENESS: &str = "whiteness";
 
+/// Name of the test of what the input predicts.
+pub(in crate::explain) const PREDICTION: &str = "prediction";
+
 /// Tests of every output.
-pub(super) const NAMES: [&str; 13] = [
+pub(super) const NAMES: [&str; 14] = [
     "mean",
     WHITENESS,
     "lines",
@@ -48,13 +51,14 @@ pub(super) const NAMES: [&str; 13] = [
     "direction",
     "amplitude",
     "trend",
+    PREDICTION,
     "level-to-level",
     "higher-order",
     "outliers",
 ];
 
 /// Names of the tests that show a dependence on the input or on time: more than autocorrelated noise.
-pub(in crate::explain) const STRUCTURE: [&str; 11] = [
+pub(in crate::explain) const STRUCTURE: [&str; 12] = [
     "mean",
     "lines",
     "past-input",
@@ -64,6 +68,7 @@ pub(in crate::explain) const STRUCTURE: [&str; 11] = [
     "direction",
     "amplitude",
     "trend",
+    PREDICTION,
     "level-to-level",
     "higher-order",
 ];

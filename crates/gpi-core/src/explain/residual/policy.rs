@@ -50,6 +50,18 @@ settings! {
         /// Part of each diagonal element that is added before its equations are solved: far below any dependence that
         /// matters, far above rounding.
         ridge: f64 = 1e-10, PART;
+        /// Part of a whitened residual's variance that the input may predict. On simulated records coloured noise has at
+        /// most 0.0013, relays, friction and Bouc-Wen hysteresis 0.011 to 0.5.
+        predicted: f64 = 0.005, PART;
+        /// Folds of that cross-validation, and the blocks of time that are dealt to them: enough that each fold has some of
+        /// every excitation, few enough that a block is longer than what the features remember. By hand.
+        predicted_folds: usize = 10, 2.0..=1e3;
+        predicted_blocks: usize = 100, 2.0..=1e4;
+        /// Part of each diagonal element of its equations that is added: features of one signal are nearly dependent.
+        predicted_ridge: f64 = 1e-4, PART;
+        /// Lags in samples of the signals' levels, and half-widths of the plays, 1 being half of a signal's range. By hand.
+        predicted_lags: [usize; 8] = [0, 1, 2, 4, 8, 16, 32, 64], 0.0..=1e6;
+        predicted_plays: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7], PART;
         /// Probability that a normal number lies beyond the six standard deviations of a wrong sample.
         six_deviations: f64 = 2e-9, PART;
         /// Wrong samples that are allowed: too few to look for a cause. By hand.

@@ -13,7 +13,7 @@ pub(super) fn normal_beyond(significance: f64) -> f64 {
 }
 
 /// The probability of a chi-square number above `value`.
-pub(super) fn chi_square_tail(value: f64, freedom: f64) -> f64 {
+pub(in crate::explain) fn chi_square_tail(value: f64, freedom: f64) -> f64 {
     gamma::gamma_ur(0.5 * freedom, 0.5 * value.max(1e-300))
 }
 
@@ -23,7 +23,7 @@ pub(super) fn at_least(count: usize, expected: f64) -> f64 {
 }
 
 /// Where a falling tail comes down to a probability.
-pub(super) fn exceeded_with(significance: f64, tail: impl Fn(f64) -> f64) -> f64 {
+pub(in crate::explain) fn exceeded_with(significance: f64, tail: impl Fn(f64) -> f64) -> f64 {
     const DOUBLINGS: usize = 60;
     const HALVINGS: usize = 100;
     let mut high = 1.0;
