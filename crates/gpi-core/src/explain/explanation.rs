@@ -138,7 +138,8 @@ pub(super) fn summarise(
     all.extend(noise);
     model = model.with_effects(all)?;
     models.resize(steps.len(), model.clone());
-    let mut rejected = state.last.clone();
+    let mut rejected = state.refused.clone();
+    rejected.extend(state.last.iter().cloned());
     rejected.extend(state.additions.iter().flat_map(|one| one.others.iter().cloned()));
     rejected.retain(|one| !effects.contains(&one.effect));
     let verdict = verdict::verdict(&effects, &tests);

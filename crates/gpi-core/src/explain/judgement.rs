@@ -19,7 +19,7 @@
 //!
 //! Of the accepted trials the one with the largest deviance beyond its threshold is taken. Trials whose deviance lies
 //! within that threshold of its own explain the same: of these, one with plausible parameters is preferred, of functions of
-//! time one that is added to the output, and the others are reported as confounded.
+//! time one that is added to the output and gains nearly the same, and the others are reported as confounded.
 
 use super::policy::JudgementPolicy;
 
@@ -185,7 +185,8 @@ pub(super) fn choose(
     };
     // of functions of time, one that is added assumes least
     let is_simpler = |trial: &Evidence| {
-        trials[best].is_slow && trial.is_slow && trial.is_added && is_as_good(trial)
+        let is_tied = trial.deviance > policy.tied * trials[best].deviance;
+        trials[best].is_slow && trial.is_slow && trial.is_added && is_tied && is_accepted(trial)
     };
     let instead = trials.iter().position(measured_instead);
     let instead = instead.or_else(|| trials.iter().position(is_simpler));
@@ -336,7 +337,7 @@ mod tests {
         assert_eq!(choose(&[drift, weaker, measured], 1.05, &policy), Some(2));
         assert_eq!(choose(&[sound(), measured], 1.05, &policy), Some(0));
         let gain_drift = Evidence { is_slow: true, ..sound() };
-        let added = Evidence { is_slow: true, is_added: true, ..equal };
+        let added = Evidence { deviance: 499.0, is_slow: true, is_added: true, ..equal };
         assert_eq!(choose(&[gain_drift, added], 1.05, &policy), Some(1));
         let doubted = Evidence { doubt: Some(Refusal::NotItsOwn), ..sound() };
         assert_eq!(choose(&[doubted, weaker], 1.05, &policy), Some(1));

@@ -43,8 +43,11 @@ pub(super) fn scored_beside(
     let base = Base::new(point, record, options.freedom, &options.loss)?;
     let values = (record.scored() * record.outputs().len()) as f64;
     let is_present = |entry: &Entry| point.effects.iter().any(|e| e.name() == entry.name);
+    let is_refused =
+        |entry: &Entry| state.refused.iter().any(|rejected| rejected.effect == entry.name);
     let usable = |entry: &&&Entry| {
-        (entry.free_order != FreeOrder::Contained || state.setup.order_is_given)
+        !is_refused(entry)
+            && (entry.free_order != FreeOrder::Contained || state.setup.order_is_given)
             && (entry.signature != Signature::ShapeOfCycle || !state.setup.is_one_sine)
             && (entry.repeats || !is_present(entry))
     };

@@ -189,7 +189,7 @@ pub(super) fn shed_lags(state: &mut SearchState, progress: Progress) -> Result<b
 pub(super) fn settle_lags(state: &mut SearchState) -> Result<(), Error> {
     let Some(before) = state.before_lags.take() else { return Ok(()) };
     let most = state.setup.policy.revision.instead_of_lags * before.cost;
-    if state.additions.len() == before.additions || state.cost > most {
+    if state.additions.len() <= before.additions || state.cost > most {
         state.additions.truncate(before.additions);
         state.point = before.point;
         state.repair()?;

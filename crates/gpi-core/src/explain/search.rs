@@ -1,9 +1,9 @@
 //! The closed loop: score candidates, fit the best few jointly, keep what the held-out data confirm.
 
-use super::examination::{doubt_at_the_end, examine};
+use super::examination::{doubt, examine};
 use super::grid::refine_grids;
 use super::judgement::{Evidence, Refusal, choose, refusal};
-use super::ranking::{Ranked, ranked, scored_beside};
+use super::ranking::{ranked, scored_beside};
 use super::revision::{
     drop_superfluous, exchange_slow, join_modes, prefer_driven, rearrange, shed_lags,
 };
@@ -15,53 +15,64 @@ use crate::effects::{Entry, FreeOrder, Signature, Stage};
 use crate::fit::minimize::Fitted;
 use crate::progress::Progress;
 
-/// Adds effects until nothing more is confirmed.
+/// Adds effects until nothing more is confirmed and all that was named passes the last examination.
 pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+    for _ in 0..state.setup.policy.revision.rounds {
+        add_effects(state, progress)?;
+        prefer_driven(state, progress)?;
+        exchange_slow(state, progress)?;
+        if !examine_all(state, progress)? {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Adds effects until nothing more is confirmed.
+fn add_effects(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
     for _ in 0..state.setup.policy.revision.rounds {
         if !round(state, progress)? && !shed_lags(state, progress)? {
             break;
         }
     }
-    prefer_driven(state, progress)?;
-    exchange_slow(state, progress)?;
-    examine_all(state, progress)
+    Ok(())
 }
 
-/// Examines every effect once more, now that the model is whole, and drops what does not pass.
-fn examine_all(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+/// Examines every effect once more, now that the model is whole; drops what does not pass, which is not tried again, and
+/// says whether there was any.
+fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    let before = state.refused.len();
     let mut place = 0;
     while place < state.point.effects.len() {
-        let Some(why) = doubt_at_the_end(state, place, progress)? else {
+        let Some(why) = doubt(state, place, progress)? else {
             place += 1;
             continue;
         };
-        let name = state.point.effects[place].name();
+        let entry = state.point.effects[place].entry();
         let holdout_rms = state.setup.holdout_rms(&state.held_out(&state.point)?);
         let without = state.point.without_effect(place);
         let fitted = state.fit(without, &state.setup.options, "without it", progress)?;
         (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
         let why = why.in_words("the model");
-        state.last.push(Rejected { effect: name, holdout_rms, why, confounded_with: Vec::new() });
-        if let Some(own) = state.additions.iter().rposition(|one| one.trial.entry.name == name) {
+        let (effect, confounded_with) = (entry.name, Vec::new());
+        state.refused.push(Rejected { effect, holdout_rms, why, confounded_with });
+        if let Some(own) = state.additions.iter().rposition(|one| one.trial.entry.name == effect) {
             state.additions.remove(own);
         }
         state.repair()?;
         // the others may have depended on it
         place = 0;
     }
-    Ok(())
+    Ok(state.refused.len() > before)
 }
 
 /// One round: takes the best effect, if any is confirmed; says whether the model became another.
 fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let policy = &state.setup.policy.ranking;
     let mut best = ranked(state, progress)?;
-    // A strong candidate is fitted first: a finer grid would partly replace it. A function of time follows whatever a
-    // coarse grid lacks, so it waits for the finer one.
-    let is_slow = |entry: &Entry| entry.signature == Signature::SlowInTime;
-    let is_strong = |one: &Ranked| one.score.gain >= policy.strong && !is_slow(one.entry);
-    let most = best.iter().max_by(|a, b| a.score.gain.total_cmp(&b.score.gain));
-    if !most.is_some_and(is_strong) && !state.is_rich && refine_grids(state, progress)? {
+    // A strong candidate is fitted first: a finer grid would partly replace it.
+    let most = best.iter().map(|one| one.score.gain).fold(0.0, f64::max);
+    if most < policy.strong && !state.is_rich && refine_grids(state, progress)? {
         best = ranked(state, progress)?;
     }
     let hopeless = policy.hopeless * state.setup.policy.judgement.least;
@@ -82,9 +93,6 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let mut better: Option<Fitted> = None;
     let taken = loop {
         let Some(place) = choose(&evidences, measured, judgement) else { break None };
-        if is_slow(trials[place].entry) && !state.is_rich && refine_grids(state, progress)? {
-            return Ok(true);
-        }
         let examined = examine(state, &trials[place], &evidences[place], progress)?;
         if examined.refusal.is_none() {
             break Some(place);
@@ -163,6 +171,7 @@ pub(super) fn force(
     if state.has(entry) {
         return Ok(());
     }
+    state.refused.retain(|one| one.effect != entry.name);
     let best = scored_beside(state, &state.point, &[entry], progress)?.into_iter().next();
     let Some(best) = best else {
         let requirement = "the record shows nothing to place it by; leave it out";

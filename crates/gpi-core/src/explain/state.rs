@@ -86,6 +86,8 @@ pub(super) struct SearchState<'a> {
     pub wrong: Vec<Vec<Vec<usize>>>,
     /// What was tried in the last round and not taken.
     pub last: Vec<Rejected>,
+    /// What was taken and did not pass the last examination.
+    pub refused: Vec<Rejected>,
 }
 
 impl<'a> SearchState<'a> {
@@ -101,6 +103,7 @@ impl<'a> SearchState<'a> {
             additions: Vec::new(),
             wrong: Vec::new(),
             last: Vec::new(),
+            refused: Vec::new(),
         }
     }
 

@@ -7,14 +7,16 @@
 //! knots' values and e the residual, and with the gap's own parts of `D'D` and `D'e` taken away,
 //!
 //! ```text
-//! delta = (D'D - D_g'D_g)^-1 (D'e - D_g'e_g),      e_gap = e_g - D_g delta.
+//! delta = (D'D - D_g'D_g + h diag(D'D))^-1 (D'e - D_g'e_g),      e_gap = e_g - D_g delta.
 //! ```
+//!
+//! h is small and keeps knots where they are that only the gap determines.
 
 use crate::chain::point::Point;
 use crate::effects::Block;
 use crate::explain::state::SearchState;
 use crate::{Error, Experiment, Matrix};
-use nalgebra::DVector;
+use nalgebra::{Cholesky, DVector};
 
 /// Whether the error inside the gaps is larger than that of the fit by more than a factor.
 pub(super) fn are_missed(state: &SearchState, point: &Point, place: usize) -> Result<bool, Error> {
@@ -53,7 +55,7 @@ pub(super) fn are_missed(state: &SearchState, point: &Point, place: usize) -> Re
             let mut gap = Products::new(knots);
             window[1..=CELLS].iter().for_each(|cell| gap.add_all(cell));
             fitted += gap.residual;
-            bridged += gap.predicted_from(&all);
+            bridged += gap.predicted_from(&all, policy.held);
         }
     }
     Ok(bridged > policy.bridged * policy.bridged * fitted)
@@ -61,9 +63,6 @@ pub(super) fn are_missed(state: &SearchState, point: &Point, place: usize) -> Re
 
 /// Cells of a gap: gaps begin in every cell, and a whole one lies on each side.
 const CELLS: usize = 3;
-
-/// Singular values below this part of the largest are rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// Derivatives of the output by each knot's value, (samples, outputs).
 fn columns(
@@ -122,13 +121,15 @@ impl Products {
     }
 
     /// The squares inside this gap after a fit to everything else.
-    fn predicted_from(&self, all: &Self) -> f64 {
-        let gram = &all.gram - &self.gram;
-        let descent = &all.descent - &self.descent;
+    fn predicted_from(&self, all: &Self, held: f64) -> f64 {
+        let mut gram = &all.gram - &self.gram;
         // a knot that nothing outside determines stays where it is
-        let largest = gram.diagonal().max();
-        let Ok(inverse) = gram.pseudo_inverse(ROUNDING * largest) else { return self.residual };
-        let delta = inverse * descent;
+        let power = all.gram.diagonal();
+        for (i, own) in power.iter().enumerate() {
+            gram[(i, i)] += held * own + f64::EPSILON * power.max();
+        }
+        let Some(factor) = Cholesky::new(gram) else { return self.residual };
+        let delta = factor.solve(&(&all.descent - &self.descent));
         let bent = (&self.gram * &delta).dot(&delta);
         self.residual - 2.0 * delta.dot(&self.descent) + bent
     }
@@ -152,6 +153,6 @@ mod tests {
                 gap.add(&row, y);
             }
         }
-        assert!((gap.predicted_from(&all) - 5.0 * 0.25).abs() < 1e-6);
+        assert!((gap.predicted_from(&all, 0.0) - 5.0 * 0.25).abs() < 1e-6);
     }
 }

@@ -3,17 +3,19 @@
 //! A trial that is significant, confirmed and substantial ([`super::judgement`]) may still be the work of something
 //! else. Before its effect is named it must also pass the following.
 //!
-//! 1. *Possible*: its values are such as a machine can have ([`Block::is_possible`](crate::effects::Block)).
-//! 2. *Its own part*: what it adds to the output differs from all that the rest of the model can do ([`own_part`]). This is
-//!    a linear statement, and parameters have bounds; so a fit without the effect must also recover a part of its gain.
-//! 3. *Bridges gaps*: a slow function of time predicts gaps between its knots as well as it fits ([`gaps`]).
-//! 4. *Not a longer fit*: the model without it, fitted again from where the trial ended, does worse by more than chance.
+//! 1. *Possible*: its values are such as a machine can have ([`Block::is_possible`]).
+//! 2. *Not a longer fit*: the model without it, fitted again from where the trial ended, does worse by more than chance.
 //!
-//! The first three questions are asked again of every effect when the search has ended, and one more, which another
-//! effect that is not found yet would make nonsense of:
+//! More is asked of every effect when the search has ended. Before that, another effect that is not found yet would make
+//! nonsense of the answers.
 //!
+//! 3. *Its own part*: what it adds to the output differs from all that the rest of the model can do ([`own_part`]), or a fit
+//!    without it leaves more than the noise.
+//! 4. *Bridges gaps*: a slow function of time predicts gaps between its knots as well as it fits ([`gaps`]).
 //! 5. *Small, or at the noise*: an effect that is a large part of the output has brought the model near the noise
 //!    ([`size`]). A large effect that leaves much unexplained follows another structure.
+//!
+//! What does not pass is not tried again, and the search goes on without it.
 
 mod contribution;
 mod gaps;
@@ -24,7 +26,7 @@ use super::judgement::{Evidence, Refusal, judge};
 use super::state::{SearchState, Trial};
 use super::trial::fitted;
 use crate::chain::point::Point;
-use crate::effects::{Effect, Signature};
+use crate::effects::{Block, Effect, Signature};
 use crate::fit::minimize::Fitted;
 use crate::{Error, Progress};
 
@@ -49,10 +51,8 @@ pub(super) fn examine(
     // what is refused may have shown the way to a better model without it
     let (without, _) = fitted(state, trial.point.without_effect(place), trial.entry, progress)?;
     let cost = without.linearization.cost;
-    let is_recovered =
-        cost - trial.cost < state.setup.policy.examination.recovered * (state.cost - trial.cost);
-    let refusal = doubt(state, &trial.point, place, trial.cost)?;
-    let refusal = refusal.filter(|why| *why != Refusal::NotItsOwn || is_recovered);
+    let is_possible = is_possible(&trial.point.effects[place]);
+    let refusal = (!is_possible).then_some(Refusal::Impossible);
     if cost >= (1.0 - state.setup.policy.examination.better) * state.cost {
         return Ok(Examination { refusal, without: None });
     }
@@ -67,46 +67,43 @@ pub(super) fn examine(
     Ok(Examination { refusal: refusal.or(again), without: Some(without) })
 }
 
-/// Why the effect at a place of a fitted point is not named, if so; `cost` are the point's training squares.
+/// Why the effect at a place of the present model is not named when the search has ended, if so.
 pub(super) fn doubt(
-    state: &SearchState,
-    point: &Point,
-    place: usize,
-    cost: f64,
-) -> Result<Option<Refusal>, Error> {
-    let effect = &point.effects[place];
-    if effect.block().is_some_and(|block| !block.is_possible()) {
-        return Ok(Some(Refusal::Impossible));
-    }
-    if !own_part::is_beyond_chance(state, point, place, cost)? {
-        return Ok(Some(Refusal::NotItsOwn));
-    }
-    let is_slow = effect.entry().signature == Signature::SlowInTime;
-    if is_slow && gaps::are_missed(state, point, place)? {
-        return Ok(Some(Refusal::Gaps));
-    }
-    Ok(None)
-}
-
-/// The same for an effect of the present model when the search has ended.
-pub(super) fn doubt_at_the_end(
     state: &SearchState,
     place: usize,
     progress: Progress,
 ) -> Result<Option<Refusal>, Error> {
-    let refusal = match doubt(state, &state.point, place, state.cost)? {
-        Some(Refusal::NotItsOwn) => {
-            let without = state.point.without_effect(place);
-            let fitted = state.fit(without, &state.setup.options, "without it", progress)?;
-            let most = (1.0 + state.setup.policy.judgement.least) * state.cost;
-            (fitted.linearization.cost < most).then_some(Refusal::NotItsOwn)
-        }
-        other => other,
-    };
-    if refusal.is_none() && size::is_too_large(state, &state.point, place)? {
-        return Ok(Some(Refusal::TooLarge));
+    let point = &state.point;
+    if !is_possible(&point.effects[place]) {
+        return Ok(Some(Refusal::Impossible));
     }
-    Ok(refusal)
+    if !own_part::is_beyond_chance(state, point, place, state.cost)?
+        && !is_needed(state, place, progress)?
+    {
+        return Ok(Some(Refusal::NotItsOwn));
+    }
+    let is_slow = point.effects[place].entry().signature == Signature::SlowInTime;
+    if is_slow && gaps::are_missed(state, point, place)? {
+        return Ok(Some(Refusal::Gaps));
+    }
+    Ok(size::is_too_large(state, point, place)?.then_some(Refusal::TooLarge))
+}
+
+/// Whether the model reaches the noise with the effect at a place, and a fit without it does not: parameters have bounds, so
+/// that the rest of the model may be unable to do what a linear test says it can.
+fn is_needed(state: &SearchState, place: usize, progress: Progress) -> Result<bool, Error> {
+    let most = state.setup.policy.judgement.near_noise * state.noise_squares()?;
+    if state.cost > most {
+        return Ok(false);
+    }
+    let without = state.point.without_effect(place);
+    let fitted = state.fit(without, &state.setup.options, "without it", progress)?;
+    let least = 1.0 + state.setup.policy.judgement.least;
+    Ok(fitted.linearization.cost > least * state.cost)
+}
+
+fn is_possible(effect: &Effect) -> bool {
+    effect.block().is_none_or(Block::is_possible)
 }
 
 /// Where the newest effect of a name stands.
