@@ -1,8 +1,8 @@
 """Print how often `explain` names the right effects, and the error before and after.
 
-The records are those with labels under `blind/dev` and `blind/foreign` of the data folder (`GPI_DATA_DIR`, else
-`../shared`), and plants of the tests' simulator that are drawn at random. `python tools/scoreboard.py --help` lists the
-options.
+The records are those with labels under `blind/dev` and `blind/foreign` of the data folder (`GPI_DATA_DIR`,
+else `../shared`), and plants of the tests' simulator that are drawn at random.
+`python tools/scoreboard.py --help` lists the options.
 """
 
 import argparse

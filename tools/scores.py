@@ -38,8 +38,8 @@ class Result:
     def is_right(self) -> bool:
         """Return whether the effects are those of the label.
 
-        A label with effects that may be named (records of other simulators) does not ask for an effect that the
-        declared model has explained down to the noise.
+        A label with effects that may be named (records of other simulators) does not ask for an effect that
+        the declared model has explained down to the noise.
         """
         if self.may is None:
             return sorted(self.wanted) == sorted(self.found)
