@@ -213,7 +213,9 @@ fn group<S: Simd, const LAGS: usize>(
             parts[i].low = simd.add_f64s(parts[i].low, rest);
         }
     }
-    for (sum, part) in sums.into_iter().zip(&parts) {
+    // a copy: an array that is read in a loop of its own would be stored to memory for every sample
+    let ends: [DoubleDouble<S>; LAGS] = std::array::from_fn(|i| parts[i]);
+    for (sum, part) in sums.into_iter().zip(&ends) {
         let (mut high, mut low) = ([begin; WIDTH], [0.0; WIDTH]);
         S::as_mut_simd_f64s(&mut high).0[0] = part.high;
         S::as_mut_simd_f64s(&mut low).0[0] = part.low;
