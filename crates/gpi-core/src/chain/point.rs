@@ -52,8 +52,10 @@ pub(crate) enum DynamicsFreedom {
 pub(crate) struct Freedom {
     /// Weights, slopes and offsets.
     pub weights: bool,
-    /// Thresholds, half-widths, start values.
+    /// Thresholds, half-widths, initial places of plays.
     pub derivatives: Derivatives,
+    /// Unknown initial states of the sections.
+    pub states: bool,
     /// The slope of the deadzone of threshold 0. Held, it fixes the scale between envelope and plays;
     /// free, the half-widths fix it.
     pub identity: bool,

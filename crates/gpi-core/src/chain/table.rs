@@ -185,7 +185,7 @@ impl Group {
             Plays { experiment, .. } => {
                 derivatives.starts && point.pasts[experiment].plays.is_some()
             }
-            State { experiment } => derivatives.starts && point.pasts[experiment].has_unknown_state,
+            State { experiment } => freedom.states && point.pasts[experiment].has_unknown_state,
         }
     }
 

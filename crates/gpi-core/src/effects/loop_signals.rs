@@ -129,6 +129,7 @@ mod tests {
         let freedom = Freedom {
             weights: true,
             derivatives: Derivatives { thresholds: false, half_widths: false, starts: false },
+            states: false,
             identity: true,
             dynamics: DynamicsFreedom::Everything,
         };

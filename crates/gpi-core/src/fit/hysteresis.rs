@@ -118,6 +118,7 @@ pub fn fit_hysteresis(
     let freedom = Freedom {
         weights: true,
         derivatives: Derivatives { starts: true, ..Derivatives::default() },
+        states: true,
         identity: false,
         dynamics: DynamicsFreedom::Nothing,
     };

@@ -38,14 +38,21 @@ pub(crate) fn fit_options(
     steps: usize,
 ) -> FitOptions {
     let JointSettings { gain, least_gain, largest_gain, .. } = prepared.settings.joint;
+    let is_unknown = prepared.has_unknown_state.contains(&true);
     let derivatives = Derivatives {
         thresholds: options.thresholds,
         half_widths: options.half_widths,
-        starts: prepared.has_unknown_state.contains(&true),
+        starts: is_unknown,
     };
     let dynamics = DynamicsFreedom::Everything;
     FitOptions {
-        freedom: Freedom { weights: true, derivatives, identity: true, dynamics },
+        freedom: Freedom {
+            weights: true,
+            derivatives,
+            states: is_unknown,
+            identity: true,
+            dynamics,
+        },
         loss: Loss::squares(prepared.means.len()),
         steps,
         gain: (gain / prepared.values()).clamp(least_gain, largest_gain),

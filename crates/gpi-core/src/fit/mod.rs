@@ -2,6 +2,7 @@
 
 mod bridge;
 mod certainty;
+pub(crate) mod dense;
 mod finish;
 pub(crate) mod gather;
 mod grid;

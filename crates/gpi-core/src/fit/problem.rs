@@ -161,6 +161,7 @@ mod tests {
         let freedom = Freedom {
             weights: true,
             derivatives: Derivatives { thresholds: true, half_widths: true, starts: true },
+            states: true,
             identity: true,
             dynamics: DynamicsFreedom::Everything,
         };

@@ -159,6 +159,7 @@ mod tests {
     const FREEDOM: Freedom = Freedom {
         weights: true,
         derivatives: Derivatives { thresholds: false, half_widths: true, starts: false },
+        states: false,
         identity: true,
         dynamics: DynamicsFreedom::Everything,
     };

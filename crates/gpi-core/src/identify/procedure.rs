@@ -116,6 +116,7 @@ pub(crate) fn compare(
         if options.delay.is_none() {
             search.lag(progress)?;
         }
+        search.enrich(progress)?;
         let stages = (None, Vec::new(), 0, rounds);
         return compared(search, true, stages, supported);
     }
@@ -142,6 +143,7 @@ pub(crate) fn compare(
     } else if options.order.is_none() {
         search.shed(progress)?;
     }
+    search.enrich(progress)?;
     let stages = (Some(seed.fir), seed.singular_values, seed.reflected, seed.rounds);
     compared(search, false, stages, supported)
 }

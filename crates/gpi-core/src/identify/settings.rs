@@ -106,6 +106,9 @@ settings! {
         slowest_lag: f64 = 0.867, PART;
         /// Samples by which the lag may shorten the delay. By hand.
         shorter: usize = 2, 0.0..=1e3;
+        /// The rms residual over the noise floor from which on plays of a dense grid are tried: below, they have next to
+        /// nothing to gain. By hand.
+        near_noise: f64 = 1.01, FROM_ONE;
         /// Growth of the cost with which a candidate is given up after a few steps: its rms is a fifth larger. By hand.
         hopeless: f64 = 1.44, FROM_ONE;
         /// Frequencies at which the response is compared, and the largest over smallest gain of a flat one. By hand.

@@ -3,6 +3,7 @@
 use crate::chain::bounds::range;
 use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{DynamicsFreedom, Point};
+use crate::fit::dense::dense;
 use crate::fit::joint::{Refined, fit_options};
 use crate::fit::minimize::fit;
 use crate::fit::preparation::{Prepared, rescale};
@@ -11,7 +12,9 @@ use crate::identify::criterion::Comparison;
 use crate::identify::identification::{Candidate, IdentifyOptions};
 use crate::identify::settings::StructurePolicy;
 use crate::linear::Sections;
+use crate::optimize::Loss;
 use crate::progress::Progress;
+use crate::uncertainty::noise_floor::NoiseFloor;
 use crate::{Error, Record};
 
 /// Tries structures in series that end where nothing is gained.
@@ -154,6 +157,22 @@ impl<'a> StructureSearch<'a> {
         if let Some(point) = self.comparison.without_slow_poles()? {
             self.comparison.offer(point, progress)?;
         }
+        Ok(())
+    }
+
+    /// Tries the plays that a dense grid asks for, where the best candidate is above the noise.
+    pub(super) fn enrich(&mut self, progress: Progress) -> Result<(), Error> {
+        let Comparison { prepared, policy, .. } = &self.comparison;
+        let Some(point) = self.comparison.best().cloned() else { return Ok(()) };
+        let is_given = matches!(self.half_widths, Some(Grid::Values(_)));
+        let residuals = point.residuals(&prepared.record)?;
+        let noise = NoiseFloor::estimate(&prepared.record, &residuals);
+        if is_given || noise.is_reached_by(&residuals, &prepared.record, policy.near_noise) {
+            return Ok(());
+        }
+        let loss = Loss::squares(prepared.means.len());
+        let rich = dense(&point, prepared, &loss, progress)?;
+        self.comparison.offer(rich, progress)?;
         Ok(())
     }
 
