@@ -15,9 +15,7 @@ use crate::chain::bounds::range;
 use crate::chain::free_run::Signals;
 use crate::chain::point::Point;
 use crate::effects::Stage;
-use crate::fit::dense::dense;
 use crate::fit::minimize::FitOptions;
-use crate::identify::NoiseFloor;
 use crate::progress::{Progress, report};
 use crate::{Error, Experiment, Matrix};
 use nalgebra::DVector;
@@ -46,7 +44,7 @@ pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Resul
         return Ok(false);
     }
     let values = state.prepared.values();
-    let mut gained = densified(state, progress)?;
+    let mut gained = false;
     for round in 0..policy.rounds {
         report(progress, "finer grid", round as f64 / policy.rounds as f64)?;
         let (point, added) = enriched(state)?;
@@ -66,28 +64,6 @@ pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Resul
         }
     }
     Ok(gained)
-}
-
-/// Takes the plays that a dense grid asks for, where the model is above the noise and they pay; says whether they do.
-fn densified(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
-    let policy = &state.setup.policy.grid;
-    let record = &state.prepared.record;
-    let residuals = state.point.residuals(record)?;
-    let noise = NoiseFloor::estimate(record, &residuals);
-    if !state.setup.moving.half_widths || noise.is_reached_by(&residuals, record, policy.near_noise)
-    {
-        return Ok(false);
-    }
-    let rich = dense(&state.point, &state.prepared, &state.setup.options.loss, progress)?;
-    let (point, cost) = on_moving_grids(state, rich, progress)?;
-    let values = state.prepared.values();
-    let more = state.setup.unknowns(&point).saturating_sub(state.setup.unknowns(&state.point));
-    let is_better = cost < state.cost
-        && values * (state.cost / cost.max(f64::MIN_POSITIVE)).ln() > more as f64 * values.ln();
-    if is_better {
-        (state.point, state.cost) = (point, cost);
-    }
-    Ok(is_better)
 }
 
 /// A point fitted with grids that move, plays and deadzones without use left out; and its squares.

@@ -70,9 +70,6 @@ settings! {
         half_widths_in_motion: usize = 24, FROM_ONE;
         /// Thresholds of a first model. By hand.
         thresholds: usize = 7, FROM_ONE;
-        /// The rms residual over the noise floor from which on plays of a dense grid are tried: below, they have next to
-        /// nothing to gain. By hand.
-        near_noise: f64 = 1.01, FROM_ONE;
         /// Times that plays and deadzones are added before effects are tried. By hand.
         rounds: usize = 6, FROM_ONE;
         /// A round that lowers the squares by less than this part is the last: another one would gain less.

@@ -116,7 +116,7 @@ pub(crate) fn compare(
         if options.delay.is_none() {
             search.lag(progress)?;
         }
-        search.enrich(progress)?;
+        enrich(&mut search, fast, progress)?;
         let stages = (None, Vec::new(), 0, rounds);
         return compared(search, true, stages, supported);
     }
@@ -143,9 +143,15 @@ pub(crate) fn compare(
     } else if options.order.is_none() {
         search.shed(progress)?;
     }
-    search.enrich(progress)?;
+    enrich(&mut search, fast, progress)?;
     let stages = (Some(seed.fir), seed.singular_values, seed.reflected, seed.rounds);
     compared(search, false, stages, supported)
+}
+
+/// Tries the plays of a dense grid, unless `fast`: a search for effects refines its grid later, and so many plays can take the
+/// place of an effect such as loops that open with speed.
+fn enrich(search: &mut StructureSearch, fast: bool, progress: Progress) -> Result<(), Error> {
+    if fast { Ok(()) } else { search.enrich(progress) }
 }
 
 fn compared(
