@@ -43,13 +43,16 @@
 //!
 //! All derivatives are those of the discrete-time recursions themselves, not of a continuous model. They are exact up
 //! to rounding where no play, stop or deadzone changes its branch, and one-sided derivatives at the samples where one
-//! does; the output is continuous there. The following are approximations.
+//! does; the output is continuous there. The following are approximations or omissions.
 //!
 //! - Derivatives by the values of effects that neither read the plays through curves, nor are sections, nor are loops
 //!   are differences ([`effect_columns`]).
 //! - [`Stream::with_memory`](stream::Stream::with_memory) leaves out what has decayed.
-//! - What a loop feeds back and what the output stage holds before the first sample is taken as independent of the
-//!   unknowns. The error decays with the dynamics, or ends when the backlash first closes its gap.
+//! - The derivative by a half-width leaves out that a curve through which the play is read may depend on the half-width
+//!   itself ([`sensitivity`]).
+//! - The steady state before the record contains no loop. Its derivatives by what a loop drives do: they contain
+//!   `(I - A)^-1 w(0)`, which is an error where w(0) is not zero, and decays with the dynamics ([`tangents`]).
+//! - What a backlash holds before it first slides is taken as independent of the unknowns ([`sensing`]).
 
 pub(crate) mod adjoint;
 pub(crate) mod bounds;

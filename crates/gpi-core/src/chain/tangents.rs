@@ -16,7 +16,8 @@
 //! slopes of the output stage ([`super::sensing`]). dr are the injections at the half-widths of stops. At the first
 //! sample the state is the steady state of its injections, `dx = (I - A)^-1 (B dv + i_x)`, because the chain was at
 //! rest at its first v before the record. The unknown part of the initial state enters as `dx_j += 1` at the end of the
-//! warm-up.
+//! warm-up. For the unknowns E_j of a loop, i_x is w(0) there, although the simulated steady state contains no `E w`:
+//! their derivatives are too large by the free response to `(I - A)^-1 i_x`, unless w(0) is zero.
 //!
 //! Rows of C and S are read together, columns of B and E driven one after the other ([`Weights`]). Eight unknowns are
 //! one [`Tile`]: each number above is a vector of eight, so that the coefficients are loaded once for all of them. One
@@ -25,7 +26,7 @@
 //! lanes and by the cores. In return, every row `dreading(k)` is known, which Gauss-Newton and covariances need. Where
 //! only the gradient is needed, [`super::adjoint`] costs one simulation in total.
 //!
-//! States below [`FADED`] are set to zero at the end of a block; nothing else is approximated here.
+//! States below [`FADED`] are set to zero at the end of a block.
 
 use super::injections::{Places, Signals, injections};
 use super::lanes::{LANES, NONE, Weights, add};
