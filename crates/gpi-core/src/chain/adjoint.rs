@@ -1,4 +1,44 @@
 //! The gradient of the cost by all unknowns at once: one pass through an experiment, and one back.
+//!
+//! With the residuals `e = y_measured - y`, weighted by `W(e)` ([`Loss`]), the cost J has the gradient
+//! `-1/2 dJ/dtheta = sum_k (dy(k)/dtheta)' W e(k)`. The forward pass stores what the linearized chain needs: signals,
+//! marks of loops, slopes of the output stage ([`Trace`]). At each sample a change passes through the chain in this
+//! order ([`super::tangents`]), where i are the injections at each place and M is the tangent of the output stage:
+//!
+//! ```text
+//! 0.  dv  = i_v
+//! 1.  dx  = (I - A)^-1 (B dv + i_x)                   at the first sample only
+//! 2.  dx += dx_0                                      at the end of the warm-up only
+//! 3.  dy  = C dx + D dv + i_y
+//! 4.  dz  = S dx + T dv + i_z   or   dy_o + i_z
+//! 5.  dw  = law'(dz, dr) + i_w
+//! 6.  dreading = M dy
+//! 7.  dx+ = A dx + B dv + E dw + i_x
+//! ```
+//!
+//! Let a bar denote the derivative of `-J/2` by a quantity. The transposed steps, in the opposite order and from the
+//! last sample to the first, with l = bar of dx(k+1) and l = 0 behind the last sample, are
+//!
+//! ```text
+//! 6'  ybar  = M' W e(k)
+//! 7'  xbar  = l,   vbar = B' l,   wbar = E' l,   l <- A' l
+//! 5'  (zbar, rbar) = law'^T wbar                      rbar: half-widths of stops
+//! 4'  l    += S' zbar,   vbar += T' zbar   or   ybar_o += zbar
+//! 3'  l    += C' ybar,   vbar += D' ybar
+//! 2'  bar of x_0 = l                                  at the end of the warm-up only
+//! 1'  m = (I - A)^-T l,   xbar += m,   vbar += B' m   at the first sample only
+//! ```
+//!
+//! An unknown that adds `f s(k)` at a place p has the gradient `f sum_k s(k) pbar(k)`. The sums of all places with all
+//! signals are the products of two matrices, (places, samples) and (samples, signals), one for each block
+//! ([`Back::met`]); the injections of [`super::injections`] then choose from (places, signals). Offsets and effects
+//! whose derivatives are differences do not stream through the chain; their part is `sum_k (dy/dtheta) W e` directly.
+//!
+//! The price of the backward pass is a simulation plus that product, whatever the number of unknowns: steps 1' to 7'
+//! have as many multiplications as 1 to 7 have for one unknown. The signals of the whole experiment are kept, so that
+//! the memory is samples times signals. The result agrees with [`super::tangents`] up to rounding (a test in
+//! `fit::problem` compares them). Source: A. Griewank and A. Walther, *Evaluating Derivatives*, 2008, chapter 3
+//! (reverse mode).
 
 use super::injections::{Injection, Places, injections};
 use super::motion::{advance_adjoint, columns, rows};
@@ -13,10 +53,11 @@ use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{DMatrixView, DVector};
 use rayon::prelude::*;
 
-/// Half the steepest descent of the cost of a record, and the cost.
+/// Half the steepest descent of the cost of a record, `-1/2 dJ/dtheta` (unknowns), and the cost J.
 ///
-/// The adjoint pass propagates the sensitivities of the cost to the outputs backwards through the chain, to every place
-/// where an unknown enters.
+/// Experiments are independent: each is passed forward and back on a core of its own, as many at once as there are cores,
+/// because each keeps its traces. With Huber's loss the weight is that of the residual itself, so that the result is the
+/// exact gradient and not that of reweighted squares.
 pub(crate) fn descent(
     point: &Point,
     table: &Table,

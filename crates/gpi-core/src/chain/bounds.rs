@@ -1,4 +1,21 @@
 //! What a step may be: one rule for each group of unknowns.
+//!
+//! The limits are those of the change s of each unknown and contain zero. For a value theta with neighbours theta_- and
+//! theta_+, sorted, and the range [low, high] of the input u:
+//!
+//! | group | limits of theta + s |
+//! |---|---|
+//! | weight of a play | at least 0 |
+//! | threshold | same side of zero; [`INSIDE`] of the range away from zero and from low and high; [`REACH`] of the gap to a neighbour |
+//! | half-width | [`REACH`] of the gap to a neighbour, on both sides; the widest: of the gap below |
+//! | start of a play | -1 to 1 |
+//! | values of an effect, a_1 of its first-order sections | those that the effect gives |
+//! | everything else | free |
+//!
+//! Scales that the output does not determine are held. v does not change if slopes and half-widths are multiplied by a
+//! factor and the weights are divided by it. The slope of the identity fixes that factor; where it is free, the
+//! half-width of the widest play that has a weight does. The row of C of the reference output fixes the scale of a
+//! section's states; the half-width zero and the threshold zero are the linear terms and never move.
 
 use super::point::{Freedom, Point};
 use super::table::{Group, Table};

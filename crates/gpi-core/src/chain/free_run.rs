@@ -1,4 +1,19 @@
 //! A point run free over a record, and the model that it is.
+//!
+//! The chain is `u -> drive -> v -> displacement -> output`, and [`Signals`] keeps the signal at each joint. A change
+//! at a stage leaves everything before it as it was, so that the output of a changed point is computed from that joint
+//! on:
+//!
+//! | change at | starts from | computes |
+//! |---|---|---|
+//! | [`Stage::Input`] | u | drive, v, displacement, output |
+//! | [`Stage::Plays`] | drive | v, displacement, output |
+//! | [`Stage::Dynamics`] | v | displacement, output |
+//! | all later stages | displacement | output |
+//!
+//! A free run depends on the input and on the initial state only, never on the measured output. The displacement begins
+//! in the steady state of v(0); at the end of the warm-up the unknown part of the initial state is added to x. The dead
+//! time of L samples drives G by `v(max(k - L, 0))`.
 
 use super::motion::Motion;
 use super::plays::Plays;
@@ -144,7 +159,8 @@ impl Point {
         .collect()
     }
 
-    /// The mean additive term of each output, experiments counted by their scored samples.
+    /// The mean additive term of each output, experiments counted by their scored samples: the mean over the whole length of
+    /// an experiment, warm-up and held-out samples included.
     pub(crate) fn mean_offsets(&self, record: &Record) -> RowDVector<f64> {
         let scored = record.scored() as f64;
         let parts = record.experiments().iter().zip(&self.offsets).map(|(e, knots)| {

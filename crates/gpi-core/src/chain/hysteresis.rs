@@ -1,4 +1,15 @@
 //! The parameters of one hysteresis.
+//!
+//! ```text
+//! z(k) = sum_j g_j Z_eta_j(u(k-1), u(k))
+//! v(k) = sum_i p_i q_i(F_i(k)),  F_i the play of half-width r_i of z; r_0 = 0, F_0 = z
+//! ```
+//!
+//! It is the generalised Prandtl-Ishlinskii operator in the parametrisation of the fit. Z_eta is the deadzone of
+//! threshold eta, one-sided (`Z_0 = u`) or directional. The parametrisation keeps the linear terms `eta_0 = 0` and
+//! `r_0 = 0` first even where their values are zero, so that places do not move. [`Parameters::to_operator`] drops what
+//! has no weight and sorts the thresholds; [`Parameters::from_operator`] does the opposite. Both keep the map from u to
+//! v.
 
 use super::plays::Plays;
 use crate::effects::{Effect, PlayCurves};
@@ -57,7 +68,7 @@ impl Parameters {
         zones.map(|(&eta, slope)| slope * self.reading.zone(eta, previous, u)).sum()
     }
 
-    /// Smallest and largest z of samples of u.
+    /// Smallest and largest z of samples of u, with u = 0 before the first.
     pub(crate) fn envelope_range(&self, u: impl Iterator<Item = f64>) -> (f64, f64) {
         let mut previous = 0.0;
         u.map(|value| self.envelope(std::mem::replace(&mut previous, value), value))
@@ -87,7 +98,8 @@ impl Parameters {
         self.run(start, plays, &u, &mut |k, plays, z| signal[k] = plays.step(z, |_, _| {}));
     }
 
-    /// Derivatives of v by the values of curves through which the plays are read, (values, samples).
+    /// Derivatives of v by the values of curves through which the plays are read, (values, samples):
+    /// `dv/dc = sum_i p_i dq_i(F_i)/dc`. F_i does not depend on c, so that one run gives them all.
     pub(crate) fn reading_slopes(
         &self,
         start: Option<&[f64]>,

@@ -1,4 +1,38 @@
 //! Where a change of each unknown enters the chain behind the hysteresis.
+//!
+//! An unknown theta changes the equation of a few places by `f s(k)` for each unit: s(k) is a recorded signal, f a
+//! constant. With the equations `y = C x + D v`, `z = S x + T v`, `w = law(z, r)`, `x+ = A x + B v + E w`:
+//!
+//! | unknown | place | signal s | factor f |
+//! |---|---|---|---|
+//! | p_i, g_j, eta_j, r_i, start of a play | v of its input | dv/dtheta ([`super::sensitivity`]) | 1 |
+//! | values of a curve through which plays are read | v of its input | dv/dtheta | 1 |
+//! | a_j of a section | x_j | x_1 of the section | -1 |
+//! | b_ji | x_j | v_i | 1 |
+//! | c_oj | y_o | x_j | 1 |
+//! | d_oi | y_o | v_i | 1 |
+//! | E_j of a loop | x_j | w | 1 |
+//! | S_j, T_i of a loop | z | x_j, v_i | 1 |
+//! | ln r of a stop | half-width | 1 | r |
+//! | weight of a stop | w | z - F, the stop | 1 |
+//!
+//! A is in observer form, so that a_j multiplies the first state only: `dA/da_j = -e_j e_1'`.
+//!
+//! # The held DC gain
+//!
+//! One element of each column of D is no unknown: `d_oi = g_i - sum_s c_o (I - A_s)^-1 b_i` keeps the DC gain g_i from
+//! input i to the output o at which it is held. A change of a section therefore changes D as well, which is an
+//! injection of v_i at y_o. With the steady state `q = (I - A)^-1 b_i` (order) and `h = c_o (I - A)^-1` (order) of the
+//! section,
+//!
+//! ```text
+//! dd_oi/da_j  =  h_j q_1        from  d (I - A)^-1 = (I - A)^-1 dA (I - A)^-1
+//! dd_oi/db_ji = -h_j
+//! dd_oi/dc_oj = -q_j
+//! ```
+//!
+//! Sections in parallel with G have no held gain. Offsets and what is added behind the output stage have no place here
+//! (`Stream::added` gives their derivatives), nor have initial states, which start as a unit of one state.
 
 use super::point::Point;
 use super::sensitivity::{Columns, Derivatives};

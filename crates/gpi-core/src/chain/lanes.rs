@@ -1,4 +1,17 @@
 //! Arithmetic on the changes of several unknowns side by side.
+//!
+//! The change of a signal by eight unknowns is one [`Lanes`]. A matrix of weights M (rows, columns) acts on eight
+//! unknowns at once in two directions:
+//!
+//! ```text
+//! gather:   sums (rows, 8)    += M  values (columns, 8)       y, z from x:  M = [C; S]
+//! scatter:  sums (columns, 8) += M' values (rows, 8)          x+ from v, w: M' = B, E
+//! ```
+//!
+//! [`Weights`] stores M by blocks of four rows, and each block by columns. In a gather, the four sums of a block stay
+//! in registers while the values are read once; with vectors of eight numbers they are four registers, with vectors of
+//! four numbers eight. Each product is a fused multiply-add, which rounds once. The results may therefore differ from
+//! the adjoint pass, which multiplies and adds, in the last bits.
 
 use pulp::Simd;
 
@@ -25,7 +38,8 @@ impl Weights {
         Self { blocks: rows.chunks(BLOCK).map(block).collect() }
     }
 
-    /// Adds to each sum what its row makes of the values, which belong to the columns from `first` on.
+    /// Adds to each sum what its row makes of the values, which belong to the columns from `first` on:
+    /// `sums_i += sum_j M_i,first+j values_j`.
     #[inline(always)]
     pub(super) fn gather<S: Simd>(
         &self,
@@ -47,7 +61,7 @@ impl Weights {
         }
     }
 
-    /// Adds to each sum, one for each column, what its column makes of the values.
+    /// Adds to each sum, one for each column, what its column makes of the values: `sums_j += sum_i M_ij values_i`.
     #[inline(always)]
     pub(super) fn scatter<S: Simd>(&self, simd: S, sums: &mut [Lanes], values: &[Lanes]) {
         for (values, block) in values.chunks(BLOCK).zip(&self.blocks) {

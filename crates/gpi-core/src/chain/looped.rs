@@ -1,4 +1,9 @@
 //! A plant with every kind of thing in the loops around G and behind them, for tests.
+//!
+//! Two inputs and two outputs, three states, three loops: one sum of stops that sees a mixture of states and inputs, a
+//! cubic power and a sum of stops that see an output each, a backlash and a polynomial behind one output. The gains of
+//! the loops are small enough that the plant stays in motion and that plays and stops both stick and slide within a
+//! run.
 
 use crate::effects::{Backlash, Effect, InnerLoop, Law, OutputNonlinearity, Sees, Stiffness};
 use crate::linear::StateSpace;

@@ -4,9 +4,25 @@
 //! z = S x + T v  (or an output),      w = law(z),      x+ = A x + B v + E w
 //! ```
 //!
-//! A power has the slope `dw/dz = n (z/s)^(n-1)`. A stop `z - F_r(z)` passes a change of z while its play F sticks; while
-//! it slides up (down), F is z - r (z + r), so that the stop shows the change of r alone. [`Law::step`] leaves these
-//! facts as marks: the slope of a power, or for each stop the direction in which its play slides, 0 where it sticks.
+//! A power has the slope `dw/dz = n (z/s)^(n-1)`. A stop `z - F_r(z)` passes a change of z while its play F sticks;
+//! while it slides up (down), F is z - r (z + r), so that the stop shows the change of r alone. [`Law::step`] leaves
+//! these facts as marks: the slope of a power, or for each stop the direction in which its play slides, 0 where it
+//! sticks.
+//!
+//! For stops with weights g_i and half-widths r_i, the step, its tangent and its adjoint are, with the mark m_i in {-1,
+//! 0, 1},
+//!
+//! ```text
+//! value     F_i = max(z - r_i, min(z + r_i, F_i)),                  w = sum_i g_i (z - F_i)
+//! tangent   where m_i != 0:  dF_i = dz - m_i dr_i;                  dw = sum_i g_i (dz - dF_i)
+//! adjoint   zbar += g_i wbar,  Fbar_i -= g_i wbar;
+//!           where m_i != 0:  zbar += Fbar_i,  rbar_i = -m_i Fbar_i,  Fbar_i = 0
+//! ```
+//!
+//! where `Fbar_i` arrives from the sample behind and goes on to the one before. A stop whose play slides at every
+//! sample thus passes nothing of z: `dw = g_i m_i dr_i`, the saturated stop. The derivative by a weight is the stop
+//! `z - F_i` itself, and is injected at w (see `injections`). w(k) drives the states for sample k + 1 only, so that no
+//! loop is algebraic and all loops of a sample are evaluated independently of each other.
 
 use super::lanes::{Lanes, NONE, add};
 use crate::effects::{InnerLoop, Law, Sees};

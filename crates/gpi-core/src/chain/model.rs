@@ -1,4 +1,17 @@
 //! A model's chain with its effects, a block of samples at a time.
+//!
+//! ```text
+//! drive = I(u);   v = GPI(drive) with effects on its plays;   displacement = G v + sections in parallel, loops closed;
+//! y = H(displacement + added before) + added after
+//! ```
+//!
+//! A block of samples starts from a [`ModelState`] and leaves the state behind its last sample, so that blocks of any
+//! length give the same output as the whole record. Each stage reads the block once, from the first sample to the last,
+//! before the next one begins. With loops, G and the loops alternate sample by sample, because w(k) drives the states
+//! for k + 1.
+//!
+//! G here is a state space whose dead time is a shift register among the states; a loop sees the v that leaves it. The
+//! estimator's [`super::point::Point`] has the same chain with G in sections and its dead time apart.
 
 use super::loops::Loops;
 use super::plays::Plays;
@@ -38,12 +51,33 @@ impl Model {
         Ok(self)
     }
 
-    /// The effects, in the order of the chain.
+    /// The effects, in the order in which they were given. Those of one place of the chain act one after the other in
+    /// this order; the places themselves have a fixed order.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
     }
 
-    /// What an engineer would call an effect's parameters, with the units of this model's channels.
+    /// What an engineer would call an effect's parameters, with the units of this model's channels: those of the
+    /// channel on which the effect acts.
+    ///
+    /// ```
+    /// use gpi_core::effects::{Backlash, Effect};
+    /// use gpi_core::linear::StateSpace;
+    /// use gpi_core::operators::{Deadzones, Gpi, PlayBank, Reading};
+    /// use gpi_core::{Channel, Matrix, Model};
+    /// # fn main() -> Result<(), gpi_core::Error> {
+    /// # let gain = Matrix::from_element(1, 1, 1.0);
+    /// # let linear = StateSpace::new(Matrix::zeros(0, 0), Matrix::zeros(0, 1), Matrix::zeros(1, 0), gain)?;
+    /// # let envelope = Deadzones::new(vec![0.0], vec![1.0], Reading::OneSided)?;
+    /// # let gpi = Gpi::new(envelope, PlayBank::new(vec![0.0], vec![2.0])?);
+    /// let (u, y) = (vec![Channel::new("drive", "V")], vec![Channel::new("position", "um")]);
+    /// let model = Model::new(10.0, u, y, vec![gpi], linear, vec![0.0])?;
+    /// let gap: Effect = Backlash { output: 0, half_width: 0.2 }.into();
+    /// let quantities = model.quantities(&gap);
+    /// assert_eq!((quantities[0].value, &quantities[0].unit[..]), (0.4, "um"));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn quantities(&self, effect: &Effect) -> Vec<Quantity> {
         let place = effect.place();
         let channel = place.input().or(place.output()).unwrap_or(0);

@@ -5,7 +5,19 @@
 //! ```
 //!
 //! A is block diagonal, one block a section in observer form: `x1+ = -a1 x1 + x2 + d1`, `x2+ = -a2 x1 + d2` for what
-//! drives it, d. Values, tangents and adjoints of a section's step stand here side by side.
+//! drives it, d. Values, tangents and adjoints of a section's step stand here side by side:
+//!
+//! ```text
+//! A = [ -a1  1 ]   x+    = A x + d             A' = [ -a1  -a2 ]   xbar = A' xbar+
+//!     [ -a2  0 ]   dx+   = A dx + dd                [  1    0  ]   dbar = xbar+
+//! ```
+//!
+//! A section of order one is `A = [-a1]`. C is (outputs, N), D (outputs, inputs), B (N, inputs), E (N, loops) with rows
+//! of zeros for sections in parallel with G. A step costs about `N (outputs + inputs + 2 loops + 1)` multiplications.
+//!
+//! The steady state at a constant v is `x = (I - A)^-1 B v` (`Section::standing`). It is exact for the linear part; a
+//! loop that feeds back at rest is not part of it, so that the state settles from there in the decay time of the closed
+//! loop.
 
 use super::lanes::{Lanes, add};
 use super::loops::Loops;
@@ -49,7 +61,7 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// Puts the state where a constant v leads to; nothing goes around the loops.
+    /// Puts the state where a constant v leads to, `x = (I - A)^-1 B v`; nothing goes around the loops.
     pub(crate) fn stand(&mut self, v: &[f64]) {
         let v = nalgebra::DVector::from_column_slice(v);
         let steady = self.sections.iter().map(|section| section.standing(&section.b) * &v);

@@ -1,4 +1,9 @@
 //! What every unknown is called in results: one rule for each group.
+//!
+//! A group of a matrix is stored by columns, so that the place of a value within its group splits by the remainder:
+//! b_ji of a section of order n stands at `n i + j`, c_oj with q outputs at `q j + o`, knot m of output o at
+//! `knots o + m`. Sections in parallel with G are numbered behind those of G, in the order of the chain. Thresholds are
+//! numbered by their rank, because the point puts the threshold 0 first and the model sorts them.
 
 use super::point::Point;
 use super::table::{Group, Table};

@@ -1,12 +1,17 @@
 //! Plays and deadzones that come and go.
+//!
+//! Adding a play of half-width r and weight p adds `p F_r` to v; adding a deadzone of threshold eta and slope g adds
+//! `g Z_eta(u)` to z. With p or g zero, the output is unchanged, and only the derivatives by the new values are new.
+//! Removing one of weight zero changes nothing either. All other operations of this file keep the output to a tolerance
+//! that each states.
 
 use super::point::Point;
 use super::table::{Group, Table};
 use crate::Matrix;
 
 impl Point {
-    /// The point with one more play, where there is none of its half-width; its initial place lies between those of
-    /// its neighbours.
+    /// The point with one more play, where there is none of its half-width; its initial place is the mean of those of
+    /// its neighbours, each as a fraction of its own half-width.
     pub(crate) fn with_play(&self, input: usize, half_width: f64, weight: f64) -> Self {
         let mut point = self.clone();
         let channel = &mut point.channels[input];
@@ -38,6 +43,9 @@ impl Point {
 
     /// Drops plays and deadzones without weight and joins deadzones that have come together; says
     /// whether there were any.
+    ///
+    /// Two deadzones at eta and eta + d, of slopes g and h, become one at eta + d of slope g + h. z changes by at most
+    /// `|g| d` beyond them.
     pub(crate) fn drop_unused(&mut self) -> bool {
         /// Thresholds closer than this fraction of their range are one.
         const TOGETHER: f64 = 3e-3;
@@ -73,6 +81,10 @@ impl Point {
     /// Puts plays without weight at `sides` from z in turn and, where half-widths may move, spreads
     /// them over the upper half below `limits` (one an input), where plays forget last; returns how
     /// many there are.
+    ///
+    /// The derivative of v by the start of a play is `p r` ([`super::sensitivity`]), zero with its weight p: a fit
+    /// cannot move such a start, so that it is set. The m idle plays get the half-widths
+    /// `limit (1/2 + (i + 1/2) / (2 m))`, i = 0 .. m - 1.
     pub(crate) fn put_idle_plays(&mut self, sides: &[f64], limits: Option<&[f64]>) -> usize {
         let mut moved = 0;
         for (input, channel) in self.channels.iter_mut().enumerate() {
@@ -104,6 +116,10 @@ impl Point {
 
     /// Takes the weight from the deadzone, the identity apart, that has the largest share in each
     /// direction that the data do not determine; says whether there was one.
+    ///
+    /// `open` is (unknowns, directions), its columns of length one in unknowns that are scaled by their sensitivities
+    /// ([`Uncertainty::open`](crate::uncertainty::covariance::Uncertainty)). The share is an element's absolute value. The
+    /// other unknowns of the direction can take over what the deadzone did; a fit afterwards makes them do so.
     pub(crate) fn silence_deadzones(&mut self, table: &Table, open: &Matrix) -> bool {
         /// Where it has a smaller share, the direction is about something else.
         const SHARE: f64 = 0.3;

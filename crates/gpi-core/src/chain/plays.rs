@@ -4,9 +4,17 @@
 //! F_i(k) = max(z(k) - w_i(k), min(z(k) + w_i(k), F_i(k-1))),      v(k) = sum_i p_i q_i(F_i(k))
 //! ```
 //!
-//! The widths w_i are the half-widths r_i unless [`PlayWidths`] let them grow with the speed of the drive, and q_i is the
-//! identity unless [`PlayCurves`] read the plays. This is the one forward definition: models, estimated points and
+//! The widths w_i are the half-widths r_i unless [`PlayWidths`] let them grow with the speed of the drive, and q_i is
+//! the identity unless [`PlayCurves`] read the plays. This is the one forward definition: models, estimated points and
 //! their derivatives step through it.
+//!
+//! Several effects of one kind are composed in the order of the chain: `w_i = W_2(W_1(r_i, s_1), s_2)` with the speeds
+//! `s_m(k)` that effect m makes of `|u(k) - u(k-1)| rate`, and `q_i = Q_2(r_i, Q_1(r_i, F_i))`. Their derivatives
+//! follow by the chain rule, `dw_i/dr_i = W_2' W_1'` and `dq_i/dF_i = Q_2' Q_1'`, and are what [`Plays::step`] shows of
+//! each play.
+//!
+//! Most plays stick at a sample. Their F_i is that of the sample before, whatever their width is now, and so is
+//! `q_i(F_i)`: curves are evaluated for the plays that move only.
 
 use crate::effects::{Effect, PlayCurves, PlayWidths};
 use crate::operators::play;

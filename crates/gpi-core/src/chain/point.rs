@@ -1,4 +1,17 @@
 //! Everything that is estimated, as one point.
+//!
+//! A point determines the simulated output of every experiment of a record. For experiment e,
+//!
+//! ```text
+//! y_e = H(G * v(I(u_e)) + loops + sections in parallel, x_e) + sum of added signals + offset_e(t)
+//! ```
+//!
+//! with the hysteresis of each input ([`Parameters`]), G in [`Sections`], and the effects by place. What belongs to an
+//! experiment alone is its initial state ([`Past`]) and its offset, piecewise linear through knots.
+//!
+//! The state vector x of an experiment has one segment for the sections of G, then one for those of each effect in
+//! parallel with G, in the order of the chain. Methods that insert or remove an effect splice the segment of every
+//! experiment, so that the other initial states keep their values.
 
 use crate::Matrix;
 use crate::chain::hysteresis::Parameters;

@@ -1,4 +1,18 @@
 //! The output stage of one output, sample by sample: values, tangents and adjoints.
+//!
+//! The effects act one after the other, `y_0 = y` and `y_i(k) = H_i(y_i-1(k), state)`. Along the motion each is either
+//! a factor, [`Slope::Times`] (curves: dH/dy; a backlash whose gap is closed: 1), or holds its output, [`Slope::Held`]
+//! (a backlash within its gap). For one effect with input x and output y,
+//!
+//! ```text
+//! tangent   Times(f):  dy(k) = f dx(k)                 Held:  dy(k) = dy(k-1)
+//! adjoint   g = ybar(k) + (what Held passed back from k + 1)
+//!           Times(f):  xbar = f g, nothing to k - 1    Held:  xbar = 0, g to k - 1
+//! ```
+//!
+//! dy before the first sample is zero: the place of a backlash at rest is taken as independent of the unknowns. That is
+//! exact where the first displacement lies within the gap around zero, and elsewhere an error until the gap first
+//! closes.
 
 use super::lanes::Lanes;
 use super::point::Point;

@@ -1,4 +1,39 @@
 //! The output of one hysteresis and its derivatives, streamed sample by sample.
+//!
+//! ```text
+//! z(k) = sum_j g_j Z_j(k),      F_i(k) = max(z - w_i, min(z + w_i, F_i(k-1))),      v(k) = sum_i p_i q_i(F_i(k))
+//! ```
+//!
+//! A play has three branches. With the width w_i(r_i) and the derivative by any parameter of the envelope or by r_i,
+//!
+//! ```text
+//! F_i slides up:     F_i = z - w_i     dF_i = dz - dw_i
+//! F_i slides down:   F_i = z + w_i     dF_i = dz + dw_i
+//! F_i sticks:        F_i = F_i(k-1)    dF_i as at the sample before
+//! ```
+//!
+//! Let k_i <= k be the sample at which play i last slid. Then dF_i by a parameter of the envelope is dz at k_i. With
+//! `c_i = p_i q_i'(F_i)`, the derivatives of v(k) are
+//!
+//! | by | derivative |
+//! |---|---|
+//! | weight p_i | `q_i(F_i(k))` |
+//! | slope g_j | `sum_i c_i Z_j(k_i)` |
+//! | threshold eta_j | `sum_i c_i dz/deta_j(k_i)`, where dz/deta_j is `-g_j` if `Z_j != 0` and 0 otherwise; `+g_j` on the falling branch of directional deadzones |
+//! | half-width r_i | `c_i s_i dw_i/dr_i`, s_i = -1 after sliding up, 1 after sliding down |
+//! | start s_i | `c_i r_i` until the play first slides, then 0 |
+//!
+//! A start is `F_i(-1) = z(0) + s_i r_i`: it moves with z(0), so that `k_i = 0` for dz, and dF_i/dr_i = s_i, until the
+//! play first slides. A play that starts from rest at F = 0 has no derivative before it slides.
+//!
+//! The sums over i of slopes and thresholds are not formed at every sample: only a play that slides changes its term,
+//! by `p_i (dz(k) - dz(k_i))`. With curves, c_i changes at other times too, and the sums are formed anew. A sample
+//! costs the number of plays plus, for each play that slides, the number of deadzones (twice with thresholds).
+//!
+//! The derivatives are exact where no play turns at the sample itself. Turning times shift with the parameters, but F_i
+//! is continuous across a turn, so that the shift adds nothing of first order. A width that depends on the speed of the
+//! drive adds no term, because the speed is a function of the drive alone. One term is left out: where a curve depends
+//! on the half-width itself, `p_i dq_i/dr_i` at a fixed F_i is not part of the derivative by r_i.
 
 use super::hysteresis::Parameters;
 use super::plays::Plays;

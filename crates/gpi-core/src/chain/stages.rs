@@ -4,8 +4,20 @@
 //! u -> input stage -> drive   ...   displacement -> (+) -> output stage -> (+) -> y
 //! ```
 //!
-//! Models and estimated points run through these definitions. `memories` has one state an effect of the chain; an
-//! empty one is filled when the effect sees its first sample, before which its input was constant.
+//! Models and estimated points run through these definitions. `memories` has one state an effect of the chain; an empty
+//! one is filled when the effect sees its first sample, before which its input was constant.
+//!
+//! With the input effects I_1, I_2, .. on an input, the effects H_1, H_2, .. on an output, and the added signals d,
+//! each in the order of the chain and each with a state of its own,
+//!
+//! ```text
+//! drive   = .. I_2(I_1(u)) ..                                             (samples, inputs)
+//! reading = .. H_2(H_1(displacement + sum_before d)) .. + sum_after d     (samples, outputs)
+//! ```
+//!
+//! The three parts of a reading run over the whole block one after the other, which gives the same as sample by sample,
+//! because no part depends on a later one. A block begins at sample `first` of the record, so that functions of time
+//! continue: t = (first + k) / rate.
 
 use crate::Matrix;
 use crate::effects::{Added, Effect, Moment, Place};

@@ -1,5 +1,24 @@
-//! One experiment streamed through the hysteresis of every input, through G and the output stage, and
-//! through all of their derivatives.
+//! One experiment streamed through the hysteresis of every input, through G and the output stage, and through all of
+//! their derivatives.
+//!
+//! The simulated output of a point is, with the dead time of G of L samples, the displacement y of [`Motion`] driven by
+//! `v(k - L)`, the signals d_1 and d_2 that effects add before and after the output stage H ([`Sensing`]), and the
+//! offset with its knots o_m:
+//!
+//! ```text
+//! y_simulated(k) = H(y(k) + d_1(k)) + d_2(k) + sum_m hat_m(k) o_m
+//! ```
+//!
+//! A sample runs in this order: hysteresis and its derivatives (v and dv/dtheta, [`Sensitivity`]); at the first sample
+//! the steady state of the sections at this v; at the end of the warm-up the unknown part of the initial state is added
+//! to x; y and the loops' w from x and v; the output stage; x to the next sample. Before the first sample nothing
+//! moved: the dead time brings in v(0) until sample L, while the hysteresis waits.
+//!
+//! A block of samples is simulated first, and what its derivatives need is recorded as a [`Trace`]: for each sample one
+//! column of [`Signals`] (1, v and dv/dtheta of every input, the derivatives by the values of curves, x, w and the
+//! stops of every loop), the marks of the loops and the slopes of the output stage. [`Tangents`] then takes all
+//! unknowns through the same block, so that a trace is read while it is in the cache. [`super::adjoint`] needs the
+//! traces of all blocks, from the last to the first.
 
 use super::injections::{ONE, Signals};
 use super::motion::Motion;
@@ -97,7 +116,8 @@ impl<'a> Stream<'a> {
     }
 
     /// Takes derivatives along from so many samples before the first scored one only: what they were before
-    /// has decayed.
+    /// has decayed. The simulation itself runs from the first sample, so that the residuals are exact. The derivatives of
+    /// v keep their whole history too; only their responses in G, loops and output stage are cut, in whole blocks.
     pub(crate) fn with_memory(mut self, samples: usize) -> Self {
         let first = self.experiment.scored_runs().next().map_or(0, |run| run.start);
         self.tangents_from = first.saturating_sub(samples);
@@ -251,6 +271,9 @@ impl<'a> Stream<'a> {
 }
 
 /// The knots next to sample k of `samples`, with their weights in linear interpolation.
+///
+/// With M knots from the first sample to the last, k stands at `p = k (M - 1) / (samples - 1)` between the knots
+/// `m = floor(p)` and m + 1, which have the weights 1 - (p - m) and p - m. One knot has the weight 1 everywhere.
 pub(crate) fn hats(k: usize, samples: usize, knots: usize) -> impl Iterator<Item = (usize, f64)> {
     let place = k as f64 / (samples.max(2) - 1) as f64 * (knots - 1) as f64;
     let left = (place as usize).min(knots.saturating_sub(2));

@@ -1,9 +1,24 @@
 //! The table of the unknowns: one row for each group, from which everything else follows.
 //!
 //! The groups of a [`Point`] stand in one fixed order. A group knows how many values it has, reads them from a point
-//! and writes them back; its bounds ([`super::bounds`]), its names ([`super::names`]) and the places of the chain
-//! where its derivatives enter ([`super::injections`]) are each one `match` over [`Group`]. A step away from a point
-//! is therefore a walk over the rows of the [`Table`].
+//! and writes them back; its bounds ([`super::bounds`]), its names ([`super::names`]) and the places of the chain where
+//! its derivatives enter ([`super::injections`]) are each one `match` over [`Group`]. A step away from a point is
+//! therefore a walk over the rows of the [`Table`].
+//!
+//! The unknown vector theta is the concatenation of the free groups in the order of `groups`: weights, slopes,
+//! thresholds and half-widths of all inputs; a, b, c of the sections of G; a, b of parallel sections; free elements of
+//! D; values of effects; offsets; starts of the plays; initial states. A held group has no row. A held value of a free
+//! group keeps its place in theta and is held by the bounds.
+//!
+//! A step s (unknowns) from a point theta is not always theta + s. With P the projection that `Group::add` and
+//! `Point::moved` apply, `theta(s) = P(theta + s)`:
+//!
+//! - weights are cut off at zero;
+//! - the change of a denominator is halved until the poles are inside the unit circle;
+//! - after a change of G, D takes what keeps the DC gain of each column: `d_oi += g_i - G_oi(1)`.
+//!
+//! The first two act on steps beyond the bounds or the region of stability only. The third is smooth, and the
+//! derivatives of [`super::injections`] contain it.
 
 use super::point::{DynamicsFreedom, Freedom, Point};
 use crate::effects::Coefficients;
@@ -118,7 +133,8 @@ impl Table {
         found.map(|(group, range)| (*group, unknown - range.start))
     }
 
-    /// Whether the output is linear in an unknown while all others are kept.
+    /// Whether the output is linear in an unknown while all others are kept. That is exact without loops and without an
+    /// output stage, and otherwise what the solver assumes when it leaves these unknowns undamped.
     pub(crate) fn is_linear(&self, unknown: usize) -> bool {
         matches!(self.at(unknown), Some((Weights { .. } | Offsets { .. } | State { .. }, _)))
     }

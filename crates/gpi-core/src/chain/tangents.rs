@@ -1,4 +1,32 @@
-//! Derivatives by all unknowns, taken through G, its loops and the output stage side by side.
+//! Derivatives by all unknowns, taken through G, its loops and the output stage side by side (forward mode).
+//!
+//! For one unknown theta, write d for the derivative by it. The chain behind the hysteresis, linearized along its
+//! motion, is a linear system that the injections i of [`super::injections`] drive:
+//!
+//! ```text
+//! dv(k)   = i_v                                        (inputs)
+//! dy(k)   = C dx + D dv + i_y                          (outputs)
+//! dz(k)   = S dx + T dv + i_z,  or dy_o                (loops)
+//! dw(k)   = law'(k) (dz, dr) + i_w                     (loops)
+//! dx(k+1) = A dx + B dv + E dw + i_x                   (N)
+//! dreading(k) = M(k) dy                                (outputs)
+//! ```
+//!
+//! law'(k) and M(k) are known from the pass forward: slopes of powers, which plays of stops slide ([`super::loops`]),
+//! slopes of the output stage ([`super::sensing`]). dr are the injections at the half-widths of stops. At the first
+//! sample the state is the steady state of its injections, `dx = (I - A)^-1 (B dv + i_x)`, because the chain was at
+//! rest at its first v before the record. The unknown part of the initial state enters as `dx_j += 1` at the end of the
+//! warm-up. For the unknowns E_j of a loop, i_x is w(0) there, although the simulated steady state contains no `E w`:
+//! their derivatives are too large by the free response to `(I - A)^-1 i_x`, unless w(0) is zero.
+//!
+//! Rows of C and S are read together, columns of B and E driven one after the other ([`Weights`]). Eight unknowns are
+//! one [`Tile`]: each number above is a vector of eight, so that the coefficients are loaded once for all of them. One
+//! pass over K samples costs about `K N (outputs + inputs + 2 loops + 1)` multiplications for each unknown, which is
+//! one simulation of the linear part; all unknowns cost as many simulations as there are unknowns, divided by the eight
+//! lanes and by the cores. In return, every row `dreading(k)` is known, which Gauss-Newton and covariances need. Where
+//! only the gradient is needed, [`super::adjoint`] costs one simulation in total.
+//!
+//! States below [`FADED`] are set to zero at the end of a block.
 
 use super::injections::{Places, Signals, injections};
 use super::lanes::{LANES, NONE, Weights, add};

@@ -1,4 +1,14 @@
 //! Unknowns in groups that fill the processor's vectors.
+//!
+//! The unknowns 8 t .. 8 t + 7 are tile t. Neighbours in the table belong to one group mostly, and therefore enter at
+//! the same places and move the same states. A tile has work space for one sample, (places, 8), and keeps the changes
+//! of the states, (N, 8), of the plays of stops and of the readings that are held, from block to block.
+//!
+//! A is block diagonal. Without loops, a change that enters at a state moves the states of its section alone; only a
+//! change of v moves all sections. A tile whose unknowns are coefficients of sections thus runs through the range of
+//! sections from the first to the last that is entered, and through no product with B. With loops, w couples all states
+//! of G, and every tile runs through all sections. An unknown without injection, such as an offset, is in a tile only
+//! if a neighbour has one; its lane stays zero and its derivatives are written by `Stream::added` afterwards.
 
 use super::injections::{Injection, Places};
 use super::lanes::{LANES, Lanes, NONE};

@@ -1,9 +1,25 @@
 //! A fitted model that candidates are compared with: its signals, residuals and sensitivities.
 //!
-//! With J the sensitivities of the weighted residuals by all p unknowns, the Gram matrix `J' J` is scaled to a unit
-//! diagonal, `S J' J S`, and decomposed into eigenvectors V and eigenvalues. Unknowns that stand at a bound are left
-//! out, and so are directions whose eigenvalue is rounding. `W = S V diag(eigenvalues)^(-1/2)` then satisfies
-//! `W W' = (J' J)^+`, so that `I - J W W' J'` projects off all that the model itself can do.
+//! With J (values, p) the sensitivities of the weighted output by all p unknowns and e (values) the weighted residual,
+//! both from [`Estimation`], let H = `J' J` (p, p) and d = `J' e` (p) be its Gram matrix and its descent. A direction
+//! that the data hardly determine has an eigenvalue of H near rounding, and units of different unknowns differ by many
+//! orders of magnitude. H is therefore scaled to a unit diagonal and decomposed,
+//!
+//! ```text
+//! S = diag(H_ii^(-1/2)),      S H S = V diag(lambda) V',      W = S V diag(lambda)^(-1/2)      (p, rank)
+//! ```
+//!
+//! with the eigenvalues that exceed [`RANK`] times the largest. W whitens the sensitivities, `W' H W = I`, so that
+//! `J W` is an orthonormal basis of what the model can do, and
+//!
+//! ```text
+//! Q = J W W' J'      projects onto it,      |Q e|^2 = |W' d|^2.
+//! ```
+//!
+//! Where all eigenvalues are kept, `W W' = H^-1`. Unknowns that stand at a bound are left out (their rows of W are
+//! zero), because a step of both signs is not possible there. A direction that is left out counts as something that the
+//! model cannot do. A unit step along it, in unknowns scaled by S, changes the output by less than
+//! `sqrt(RANK lambda_max)`.
 
 use super::policy::score::RANK;
 use crate::chain::free_run::Signals;

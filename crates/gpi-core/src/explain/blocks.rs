@@ -1,4 +1,18 @@
 //! Blocks of time that are kept for the test.
+//!
+//! An experiment of K samples, W of them warm-up, is divided behind its first part `lead` into B equal stretches, and a
+//! part `fraction` of each stretch is a block:
+//!
+//! ```text
+//! first = W + lead (K - W),      length = (K - first) / B,
+//! block i = [first + length (i + c (1 - fraction)), the same + fraction length)
+//! ```
+//!
+//! c in [0, 1] is the place within the stretch: 0.5 is the middle. The first c of the policy's list is taken whose
+//! block contains no extreme of an input (its largest, smallest and fastest sample), or else the first of the list.
+//! With the settings of the policy, the blocks cover `fraction (1 - lead)` of the scored time.
+//!
+//! The differences of the squares of B blocks have a standard error, which [`super::judgement`] uses.
 
 use super::policy::HoldoutPolicy;
 use crate::{Error, Experiment, Record};

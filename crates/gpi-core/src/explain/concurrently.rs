@@ -1,4 +1,9 @@
 //! Jobs on all cores at once.
+//!
+//! Jobs run in the pool of threads, and each reports its stage and progress through a channel. Only the calling thread
+//! calls `progress`, which need not be thread-safe. Its answer false is stored in a flag that every job reads at its
+//! next report, so that all jobs end at their next step. The results have the order of the jobs, so that the outcome
+//! does not depend on which one finishes first.
 
 use crate::Error;
 use crate::Progress;

@@ -233,7 +233,14 @@ fn is_weighty(trial: &Evidence, policy: &JudgementPolicy) -> bool {
 ///
 /// The sum must fall. Beyond that, either the mean difference of the blocks exceeds its standard error by a factor,
 /// or the blocks that become better gain far more than the others lose: an effect may show in few blocks only, and
-/// makes their differences vary.
+/// makes their differences vary. With `d_b = before_b - after_b` for n blocks, both of
+///
+/// ```text
+/// sum d_b > confirmed sum before_b,
+/// mean d > z sqrt(var d / n)   or   sum of d_b > 0 exceeds a factor times -(sum of d_b < 0)
+/// ```
+///
+/// must hold, where var d divides by n - 1. It is the paired t-test of two models on the same blocks.
 pub(super) fn is_confirmed([before, after]: [&[f64]; 2], policy: &JudgementPolicy) -> bool {
     let differences: Vec<f64> = before.iter().zip(after).map(|(a, b)| a - b).collect();
     let n = differences.len() as f64;

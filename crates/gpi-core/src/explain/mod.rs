@@ -1,18 +1,18 @@
 //! Which effects of the catalogue a record's model lacks.
 //!
 //! 1. The declared model (deadzones, plays, G) is identified on the training data: the record without ten blocks of
-//!    time ([`blocks`]). G gets no poles that would follow creep or a disturbance.
-//! 2. Every candidate of the catalogue is ranked by a score test ([`score`]): the change of the output by the effect,
-//!    projected off the model's own sensitivities ([`projection`]), explains a part of the residual.
-//! 3. The best few are fitted jointly with the whole model ([`trial`]). The one that explains most is accepted if it is
-//!    significant and the held-out blocks confirm it ([`judgement`]), and if what it does is its own
-//!    ([`examination`]). Effects that it makes superfluous are dropped ([`revision`]).
+//!    time (`blocks`). G gets no poles that would follow creep or a disturbance.
+//! 2. Every candidate of the catalogue is ranked by a score test (`score`): the change of the output by the effect,
+//!    projected off the model's own sensitivities (`projection`), explains a part of the residual.
+//! 3. The best few are fitted jointly with the whole model (`trial`). The one that explains most is accepted if it is
+//!    significant and the held-out blocks confirm it (`judgement`), and if what it does is its own
+//!    (`examination`). Effects that it makes superfluous are dropped (`revision`).
 //! 4. Steps 2 and 3 are repeated until no effect is accepted. Then an effect that the input drives replaces a slow
-//!    function of time that it explains as well, and the residual is tested for remaining structure ([`residual`]).
+//!    function of time that it explains as well, and the residual is tested for remaining structure (`residual`).
 //!
-//! The files import in one direction only: [`policy`] (every tolerance), [`judgement`], [`base`], [`projection`],
-//! [`score`], [`setup`] (what never changes), [`state`] (where the search stands), [`ranking`], [`trial`],
-//! [`examination`], [`grid`], [`revision`], [`search`], [`explanation`].
+//! The files import in one direction only: `policy` (every tolerance), `judgement`, `base`, `projection`,
+//! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `trial`,
+//! `examination`, `grid`, `revision`, `search`, `explanation`.
 
 pub(crate) mod base;
 mod blocks;

@@ -1,4 +1,17 @@
 //! A resonance whose frequency depends on the output's amplitude: nothing in front of G can cause that.
+//!
+//! The frequency of a section with a complex pair of poles `rho exp(+-i phi)` is `f = phi rate / (2 pi)`. It follows
+//! from the fits of two experiments, of least and largest amplitude, and its standard deviation s from the covariance
+//! of the parameters by the delta method. The frequencies differ by
+//!
+//! ```text
+//! |f_1 - f_2| / sqrt(s_1^2 + s_2^2)
+//! ```
+//!
+//! standard errors, because the experiments have independent noise. The section of the largest ratio is reported if the
+//! ratio exceeds the policy's. Sections keep their order between the fits, because both start from the same model.
+//!
+//! f is the damped natural frequency of the poles, not the frequency of the peak of the response.
 
 use super::policy::ResonancePolicy;
 use crate::Progress;

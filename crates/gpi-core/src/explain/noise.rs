@@ -1,4 +1,24 @@
 //! Effects of the noise: isolated wrong samples, and autocorrelation.
+//!
+//! *Wrong samples* are those that `uncertainty::outliers` finds. They are named if there are several, if fewer than a
+//! part of them follow a jump of the input within a few samples (else the model errs at jumps), and if their squares
+//! are a part of all: `sum_wrong c^2 > least (|e|^2 + sum_wrong c^2)`, where c is by how much a sample was changed.
+//!
+//! *Autocorrelated noise* is an autoregression of the residual e of an output,
+//!
+//! ```text
+//! e(k) = sum_i a_i e(k - i) + w(k),      s_e = rms(e),      s_w = rms(w),
+//! ```
+//!
+//! with coefficients from the training data ([`NoiseModel`]: Levinson and Durbin's recursion, order by the BIC). A
+//! model that lacks hysteresis or friction leaves an autocorrelated residual as well. It is called noise only if
+//!
+//! - no test of structure fails;
+//! - s_w < (1 - p) s_e on the training data and, with the same a_i, on the held-out blocks;
+//! - s_w is near the noise floor, because the fast part of coloured noise is in its innovations;
+//! - s_e is near the noise at rest, or a small part of the output's span where the input never rests;
+//! - the kurtosis `mean(e^4) / mean(e^2)^2` is near 3, that of a stationary Gaussian process of any autocorrelation: an
+//!   error that comes in bursts while the stage moves has more.
 
 use super::policy::NoisePolicy;
 use super::residual::{ResidualTest, STRUCTURE};

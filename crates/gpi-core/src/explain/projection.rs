@@ -7,7 +7,20 @@
 //! - `score = C' (I - Q) e = C' e - (W' J' C)' (W' J' e)`,
 //! - `cost = e' (I - Q) e = e' e - |W' J' e|^2`, what a converged model would leave.
 //!
-//! J has millions of rows and is never stored: it is streamed once, and `J' C`, `C' C` and `C' e` are summed on the way.
+//! J has millions of rows and is never stored: it is streamed once, and `J' C`, `C' C` and `C' e` are summed on the
+//! way.
+//!
+//! The first line follows from `(I - Q)' (I - Q) = I - Q`, because Q is symmetric and `W' J' J W = I`. Where squares
+//! are scaled by a weight (loss and units of the outputs), every product contains it once: `C' C` stands for
+//! `sum_k weight(k) C(k)' C(k)`. With Huber's loss the weights are those at the present residual, and `e' e` is the
+//! loss itself, which exceeds the weighted squares; for plain squares both are the same.
+//!
+//! The difference in `left` loses digits where a candidate is nearly what the model does already. Its columns are left
+//! out in [`super::score`] where less than a part of `squares` remains.
+//!
+//! The memory is (p, n) for n columns and, for one experiment at a time, (samples, n). For loops with many values even
+//! that is avoided: their derivatives are unknowns of a model that contains the loop, and C'C, J'C and C'e are blocks
+//! of the Gram matrix and of the descent of that larger model.
 
 use super::base::Base;
 use crate::chain::free_run::Signals;

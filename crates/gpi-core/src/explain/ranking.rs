@@ -1,4 +1,22 @@
 //! Which effects the score test finds most promising.
+//!
+//! A candidate whose q columns would take the part gamma of the squares of N values ([`super::score`]) has the deviance
+//! `-N ln(1 - gamma)`, because the deviance is `N ln(J_before / J_after)`. Its worth is what exceeds the price of q
+//! parameters in the BIC (G. Schwarz, 1978):
+//!
+//! ```text
+//! worth = -N ln(1 - gamma) - q ln N
+//! ```
+//!
+//! Each effect is represented by its candidate of largest worth; effects of no worth, or of less than a part of the
+//! best one's, are not fitted.
+//!
+//! A slow function of time is offered with a growing number of knots, each twice as many as the one before. More knots
+//! follow faster variations, whatever causes them. A candidate of n knots counts only if that of n / 4 knots, two
+//! places before it, reaches a part of its gain: most of what it explains is then slow on the scale of four of its
+//! knots. The coarsest candidates have no such condition.
+//!
+//! On a long record, sensitivities of representative experiments stand for all, and N is the number of their values.
 
 use super::base::Base;
 use super::policy::RankingPolicy;

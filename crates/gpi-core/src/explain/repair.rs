@@ -1,4 +1,9 @@
 //! Isolated wrong samples replaced, so that no fit has to follow them.
+//!
+//! A wrong sample of output y at k becomes `y(k) + (e(k-1) + e(k+1)) / 2 - e(k)`, with the residual e of the present
+//! model. Its new residual is the mean of those of its neighbours, so that a smooth error of the model is kept and the
+//! sample counts as one of average misfit. Samples are replaced and not left out, because filters and runs need them
+//! without gaps.
 
 use crate::{Error, Matrix, Record};
 

@@ -1,4 +1,22 @@
 //! Earlier decisions, examined again once more is known.
+//!
+//! All decisions compare two fitted models by the deviance lost, `lost = N ln(J_without / J_with)`, J the training
+//! squares, and by the held-out squares T. The factors f are those of the policy.
+//!
+//! | decision | condition |
+//! |---|---|
+//! | an effect is superfluous | `lost` < threshold of the newest effect, and `T_without < f T_with` |
+//! | an added signal moves to the other side of the output stage | `J_moved < (1 - f) J` |
+//! | a driven effect replaces a slow function of time | `lost` < threshold of the slow one, `T_driven < f T_slow`, plausible values |
+//! | a slow function of time replaces another | `J_other < (1 - f) J` |
+//! | an effect replaces slow poles of G | `J_effect <= f J_poles` at the end of the search, else the poles return |
+//!
+//! An effect that was accepted early, with little else in the model, has often taken what belongs to a later one. The
+//! first decision is therefore made after each addition. The dropped effect may have moved the newest one far from
+//! where it would be alone; the fit without it is thus also started from the score test, and the better one counts.
+//!
+//! Slow functions of time are flexible enough to follow much of what the input drives, but they do not predict another
+//! experiment. That is why a driven effect that explains as much is preferred, and not the other way round.
 
 use super::judgement::is_superfluous;
 use super::ranking::{Ranked, scored_beside};

@@ -1,13 +1,28 @@
 //! The score (Lagrange multiplier) test: what a candidate would explain, without fitting it.
 //!
-//! A candidate's probes change the output by columns C, linearly as long as the changes are small. If e is the residual,
-//! a joint fit of C and of the model's own unknowns would lower the squared residual, to first order, by the part
+//! A candidate's probes change the output by columns C, linearly as long as the changes are small. If e is the
+//! residual, a joint fit of C and of the model's own unknowns would lower the squared residual, to first order, by the
+//! part
 //!
 //! `gain = s' L^-1 s / c`, with `L = C~' C~`, `s = C~' e`, `C~ = (I - J J^+) C`
 //!
-//! and c what the model itself, fully converged, would leave ([`Projection`]). It is (T7) in the documentation's theory.
-//! The solution `L^-1 s` gives the candidate's parameters to start a fit from. Because all candidates are compared with
-//! the same J, the catalogue is ranked without a single fit.
+//! and c what the model itself, fully converged, would leave ([`Projection`]). It is (T7) in the documentation's
+//! theory. The solution `L^-1 s` gives the candidate's parameters to start a fit from. Because all candidates are
+//! compared with the same J, the catalogue is ranked without a single fit.
+//!
+//! Derivation: the joint fit minimises `|e - J a - C b|^2` over a (p) and b (n). For fixed b, the best a leaves
+//! `|(I - Q)(e - C b)|^2 = c - 2 b' s + b' L b`, Q = J J^+. Its minimum over b is at `L b = s`, where it has fallen by
+//! `s' L^-1 s`. It is the score statistic over N (C. R. Rao, *Large sample tests of statistical hypotheses concerning
+//! several parameters*, 1948): in the absence of the effect, N gain is asymptotically chi-square with rank(L) degrees
+//! of freedom.
+//!
+//! The approximation is the linearity in b. A probe is linear in its value where the proposal says so; elsewhere each
+//! proposal is one grid value of a parameter that is not linear (a time constant, a half-width), and the best of the
+//! grid counts.
+//!
+//! L is solved in eigenvectors after scaling to a unit diagonal, and directions with eigenvalues below [`OWN_RANK`] are
+//! left out: probes of one candidate may do the same. A probe of which the model does all but the part [`LEFT`] is not
+//! used.
 
 use super::base::Base;
 use super::policy::score::{AT_ONCE, LEFT, MANY, OWN_RANK};
@@ -122,7 +137,8 @@ fn scored(candidate: &Proposal<Effect>, first: usize, projection: &Projection) -
     }
 }
 
-/// The least squares solution of symmetric equations, directions without power left out.
+/// The least squares solution of symmetric equations, directions without power left out: with `S = diag(M_ii^(-1/2))` and
+/// `S M S = V diag(lambda) V'`, it is `S V diag(1 / lambda) V' S rhs` over the lambda that are large enough.
 fn solve_scaled(matrix: Matrix, rhs: &DVector<f64>) -> DVector<f64> {
     let n = matrix.nrows();
     if n == 0 {

@@ -1,4 +1,16 @@
 //! The state of a search: the model so far, its squares, and what was added to it.
+//!
+//! Squares are weighted sums over the scored samples k of residuals e (samples, outputs), with the weights w_o that
+//! bring outputs of different units to one scale:
+//!
+//! ```text
+//! J = sum_o w_o^2 sum_k e_o(k)^2
+//! ```
+//!
+//! The training squares score what is not held out, with the initial states that were fitted there. The held-out
+//! squares come from the same free run over the whole record, block by block, so that no initial state has to be found
+//! for a block. The squares that noise alone would leave are `K sum_o w_o^2 s_o^2`, with K scored samples and the noise
+//! floor s_o of each output.
 
 use super::repair::{everything, repaired};
 use super::setup::SearchSetup;

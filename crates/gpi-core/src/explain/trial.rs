@@ -1,4 +1,24 @@
 //! One more effect, fitted jointly with the whole model.
+//!
+//! A trial minimises the training squares J over all parameters, those of the effect included. Its deviance is
+//!
+//! ```text
+//! D = N ln(J_before / J_after)
+//! ```
+//!
+//! for N values. J_before belongs to the present model, fitted with the same parameters free but those of the effect.
+//! An effect on the plays is fitted with the grids free too, because they were placed to replace what the plays lacked;
+//! the present model, fitted in the same way without the effect, then gains part of D, and that part is subtracted.
+//!
+//! A fit begins where the score test says, at `b = L^-1 s` (see [`super::score`]). It begins at the effect without
+//! action where b violates the effect's bounds, or where the squares at b exceed those of the present model by a
+//! factor: the linear prediction does not hold there. A fit that used all its steps and still lowered the squares over
+//! its last ones is continued.
+//!
+//! The threshold of D is a function of numbers ([`Significance`]). If D lies between the threshold for white noise and
+//! where autocorrelation could no longer matter, the residual's autocorrelation is measured by
+//! `kappa = tr(H^-1 M) / (s^2 p)` over p parameters, M the covariance of the score (see [`crate::fit::certainty`]),
+//! which is 1 for white noise, and the threshold is raised by it.
 
 use super::concurrently::concurrently;
 use super::judgement::Significance;

@@ -1,4 +1,13 @@
 //! The end of a refinement: superfluous parts are removed, and the uncertainty of the rest is computed.
+//!
+//! - Plays and deadzones of weight zero do not change the output. They are removed, and a few steps let the rest
+//!   settle.
+//! - Deadzones may replace each other: eigenvectors of the scaled Gram matrix whose eigenvalues are negligible are
+//!   directions in which the output does not change. In each, the deadzone of largest share, if it is large enough, is
+//!   set to zero, and the rest is fitted again. The removal stands if `J_after <= (1 + l / N) J_before`, J the cost of
+//!   N values: for small l, the deviance `N ln(J_after / J_before)` is then at most l, in units in which a superfluous
+//!   parameter gains 1 on average.
+//! - The standard deviations are those of the estimated unknowns ([`certainty`]); an unknown at a bound has none.
 
 use crate::fit::certainty;
 use crate::fit::joint::Refined;

@@ -1,4 +1,8 @@
 //! Rows of derivatives, gathered while they are streamed.
+//!
+//! Streaming K samples costs about K p N operations for p unknowns and N states; summing `psi psi'` costs K p^2. Both
+//! run at the same time on two threads. The channel between them holds four blocks, which bounds the memory when the
+//! sums are slower.
 
 use crate::Error;
 use crate::chain::stream::{Rows, Stream};

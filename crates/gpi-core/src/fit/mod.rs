@@ -1,4 +1,16 @@
 //! Fits of a model to a record: preparation, the least squares problem, the joint fit, and its uncertainty.
+//!
+//! For the unknowns theta of a [`Table`](crate::chain::table::Table), the residuals e_o(k) of a free run and the loss
+//! rho of [`Loss`](crate::optimize::Loss) with weight w (`rho(e) = w e^2` for squares), the cost and its linearization
+//! are
+//!
+//! ```text
+//! J = sum_k,o rho_o(e_o(k)),      psi_o(k) = d y_o(k) / d theta            (p)
+//! H = sum w psi psi'  (p, p),     d = sum w psi e  (p),      dJ/dtheta = -2 d
+//! ```
+//!
+//! H and d are all that a step, the projections of `explain` and, with the residual's autocorrelation, the covariance
+//! need; the rows psi are streamed and never stored.
 
 mod bridge;
 mod certainty;

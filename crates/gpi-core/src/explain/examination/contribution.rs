@@ -1,4 +1,8 @@
 //! What an effect adds to the output of a fitted model.
+//!
+//! All other parameters keep their fitted values: c is not what a new fit without the effect would lose, but what the
+//! effect does in this model. The model without the effect is simulated from the input stage on, because an effect may
+//! act anywhere; its initial states are those of the model with it, less the states of the effect's own sections.
 
 use crate::chain::free_run::Signals;
 use crate::chain::point::Point;

@@ -1,16 +1,30 @@
 //! Whether a slow function of time bridges gaps between its knots.
 //!
 //! A function of time with many knots follows whatever the model lacks, slow or not. One that is really there is smooth
-//! on the scale of its knots, so that it is known inside a gap from its two sides. Gaps somewhat longer than the spacing of the
-//! knots are taken from the record, one after the other. For each, the knots are fitted again without the gap, and the
-//! residual inside the gap is compared with that of the fit to everything. With D the derivatives of the output by the
-//! knots' values and e the residual, and with the gap's own parts of `D'D` and `D'e` taken away,
+//! on the scale of its knots, so that it is known inside a gap from its two sides. Gaps somewhat longer than the
+//! spacing of the knots are taken from the record, one after the other. For each, the knots are fitted again without
+//! the gap, and the residual inside the gap is compared with that of the fit to everything. With D the derivatives of
+//! the output by the knots' values and e the residual, and with the gap's own parts of `D'D` and `D'e` taken away,
 //!
 //! ```text
 //! delta = (D'D - D_g'D_g + h diag(D'D))^-1 (D'e - D_g'e_g),      e_gap = e_g - D_g delta.
 //! ```
 //!
 //! h is small and keeps knots where they are that only the gap determines.
+//!
+//! The squares inside the gap follow from the same products, without the rows of D:
+//!
+//! ```text
+//! |e_gap|^2 = e_g'e_g - 2 delta' D_g'e_g + delta' D_g'D_g delta
+//! ```
+//!
+//! The sum over all gaps is compared with the sum of `e_g'e_g`. D is taken from differences and the knots alone are
+//! fitted again; all other parameters are held. That is exact where the output is linear in the knots: for a drift and
+//! for a gain that drifts, unless a curve or a gap stands behind them.
+//!
+//! Products are summed by cells, a third of a gap each, so that gaps begin in every cell at the price of one pass over
+//! the record. A gap is used where whole cells lie on both sides of it, since next to a block that is held out it would
+//! be longer.
 
 use crate::chain::point::Point;
 use crate::effects::Block;

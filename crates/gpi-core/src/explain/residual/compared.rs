@@ -1,4 +1,7 @@
 //! The residual and what it is compared with.
+//!
+//! Sums and means run over the scored samples of all experiments, in the order of time, and products are never formed
+//! across the border of two experiments. A mean is that of an output over all experiments together.
 
 use super::policy::ResidualPolicy;
 use crate::{Matrix, Record};

@@ -1,4 +1,20 @@
 //! Functions of input, intermediate signal, output and time that a residual must not follow.
+//!
+//! With the simulated output x and the levels of u and v scaled to [-1, 1], s the step of u from sample to sample over
+//! its rms, t in [-1, 1] the time, and A the local amplitude of a signal:
+//!
+//! | family | functions |
+//! |---|---|
+//! | `past-input`, `past-intermediate` | level, and steps some samples ago, of u or of v |
+//! | `level` | x, x^2, .., x^5 |
+//! | `speed` | abs(s), s abs(s), s^2, x abs(s); s clipped |
+//! | `direction` | sign(s) x^n, n = 0 .. 3 |
+//! | `amplitude` | A x of the output, and A s for each input |
+//! | `trend` | t, t^2, t^3, sin 6t, cos 6t |
+//!
+//! The local amplitude is `A = low(( level - low(level))^2)` with the first-order low-pass
+//! `low(k) = a low(k-1) + (1 - a) x(k)`, `a = exp(-1 / (seconds rate))`: the power of the part that is faster than the
+//! window.
 
 use super::compared::Compared;
 use super::outcome::points_to;
@@ -164,7 +180,8 @@ fn steps(x: &[f64]) -> Vec<f64> {
     first.into_iter().chain(x.windows(2).map(|pair| pair[1] - pair[0])).collect()
 }
 
-fn sign(s: f64) -> f64 {
+/// -1, 0 or 1.
+pub(super) fn sign(s: f64) -> f64 {
     if s == 0.0 { 0.0 } else { s.signum() }
 }
 

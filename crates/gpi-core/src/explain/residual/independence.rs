@@ -1,4 +1,20 @@
 //! Dependence of the residual on other signals, for noise of any autocorrelation.
+//!
+//! Let f be a function of input, output or time, and e the residual. If e does not depend on f, the products
+//! `(f(k) - mean f) e(k)` have mean zero, but neighbours are correlated, so that their sample variance says nothing of
+//! the variance of their sum. They are summed over b = 1 .. B blocks of time to g_b instead. Sums of blocks that are
+//! longer than the correlation are nearly independent, with mean zero and variances of their own, and
+//!
+//! ```text
+//! t = sum_b g_b / sqrt(sum_b g_b^2)
+//! ```
+//!
+//! is self-normalised: approximately standard normal whatever the variances are, and its tails are no heavier than
+//! Gaussian, `P(t > c) <= exp(-c^2 / 2)`, if the g_b are symmetric (B. Efron, *Student's t-test under symmetry
+//! conditions*, 1969). By Cauchy and Schwarz, t never exceeds sqrt(B).
+//!
+//! The largest |t| of m functions has at most m times the tail probability of one (Bonferroni), which gives the
+//! threshold and the p-value of a family.
 
 use super::compared::Compared;
 use super::families::{Family, Regressor};

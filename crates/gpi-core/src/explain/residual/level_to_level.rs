@@ -1,4 +1,17 @@
 //! Whether the residual follows the input's past differently where the input's amplitude is larger.
+//!
+//! With rows phi(k) of what is alike at all amplitudes (levels and steps of u and v at many lags, one constant for each
+//! contrast and one for all) and the contrasts `q_l(k) = c(k) f_l(k)`, where f_0 is the level of u and f_l a step of its past,
+//! two regressions give
+//!
+//! ```text
+//! e~ = e - phi' beta,   q~_l = q_l - phi' gamma_l,      t_l of the block sums of q~_l(k) e~(k)
+//! ```
+//!
+//! By the theorem of R. Frisch and F. V. Waugh (1933), `sum q~_l e~ / sum q~_l^2` is the coefficient of q_l in a regression of
+//! e on phi and q_l together: by how much more e follows f_l at large amplitudes than at small ones, half the difference of
+//! its slopes there. Both regressions have the same matrix `sum phi phi'`; a second pass over the record forms the products.
+//! The t of [`BlockSums::t`] holds for autocorrelated noise, which the usual standard error of a coefficient does not.
 
 use super::compared::Compared;
 use super::families::{ScaledSignal, ScaledSignals, Signal};

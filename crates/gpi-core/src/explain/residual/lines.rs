@@ -1,4 +1,15 @@
 //! Lines in the residual's spectrum.
+//!
+//! The periodogram `P_k = |sum_j h(j) e(j) exp(-2 pi i j k / n)|^2` of white noise, with a taper h, has exponentially
+//! distributed values. The ratio of the largest of a group of `around` neighbours to their median thus has a tail that
+//! does not depend on the level of the noise ([`single_above`]); with the number of frequencies it gives the p-value.
+//! It is R. A. Fisher's test (1929) with a local background in place of the total power.
+//!
+//! In a steep spectrum the median of neighbours is no measure of the background at a place. The residual is therefore
+//! whitened first by its autoregression. An autoregression also flattens a strong line, because it is predictable. It
+//! is therefore fitted to a copy of the residual without its lines: each place of the spectrum that stands out of the
+//! larger of the medians on both sides by a factor is cut down to it, which keeps a resonance, wider than a line, and
+//! the phase.
 
 use super::compared::Compared;
 use super::outcome::{ResidualTest, points_to};

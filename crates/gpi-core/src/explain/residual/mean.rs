@@ -1,4 +1,7 @@
 //! The mean of the residual.
+//!
+//! The t of [`super::independence`] with the function 1: `t = sum_b g_b / sqrt(sum_b g_b^2)`, g_b the sum of the
+//! residual over block b. The residual is taken as it is here, not without its mean as in the other tests.
 
 use super::compared::Compared;
 use super::independence::{BlockSums, dependence};

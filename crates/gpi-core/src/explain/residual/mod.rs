@@ -1,7 +1,22 @@
 //! Named tests of a residual, each with the effects that it points to.
 //!
-//! The significance level of every test is one hundredth over the number of tests (Bonferroni's correction), so that
-//! at most one record of pure noise in a hundred fails any of them.
+//! The significance level of every test is one hundredth over the number of tests (Bonferroni's correction), so that at
+//! most one record of pure noise in a hundred fails any of them.
+//!
+//! | test | statistic | if the residual e is noise |
+//! |---|---|---|
+//! | `mean` | t of blocks of e | normal ([`independence`]) |
+//! | `whiteness` | Ljung and Box's Q | chi-square; white noise only ([`whiteness`]) |
+//! | `lines` | periodogram of whitened e over its local median | order statistics of exponential numbers ([`lines`]) |
+//! | `past-input` to `trend` | largest t of blocks of e times a function of u, v, y or t | normal ([`independence`], [`families`]) |
+//! | `prediction` | part of the whitened variance that u predicts, cross-validated | at most about zero ([`prediction`]) |
+//! | `level-to-level` | largest t of slopes that differ between amplitudes | normal ([`level_to_level`]) |
+//! | `higher-order` | as `level` to `trend`, of e^2 without its mean | normal ([`independence`]) |
+//! | `outliers` | number of isolated samples | Poisson ([`wrong_samples`]) |
+//!
+//! All tests but `whiteness` hold for autocorrelated noise. The residual is taken without its mean except for `mean`.
+//! Values that are no larger than what rounding leaves of the simulation are set to zero, so that an exact model
+//! passes.
 
 mod compared;
 mod families;

@@ -27,7 +27,15 @@ pub struct ResidualTest {
 }
 
 impl ResidualTest {
-    /// Whether the residual shows nothing here.
+    /// Whether the residual shows nothing here: `statistic <= threshold`.
+    ///
+    /// ```
+    /// use gpi_core::explain::ResidualTest;
+    /// let test = ResidualTest {
+    ///     name: "mean", output: 0, statistic: 3.5, threshold: 4.0, p_value: 5e-4, points_to: String::new(),
+    /// };
+    /// assert!(test.passed()); // rare by itself, but not among all tests of a record
+    /// ```
     pub fn passed(&self) -> bool {
         self.statistic <= self.threshold
     }

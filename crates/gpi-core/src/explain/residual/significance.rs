@@ -1,4 +1,12 @@
 //! Distributions of the statistics where the residual is noise: tail probabilities, and their inverses.
+//!
+//! ```text
+//! normal       P(|x| > z) = erfc(z / sqrt 2)
+//! chi-square   P(x > c)   = Q(nu / 2, c / 2)         Q, P: upper and lower regularised incomplete gamma functions
+//! Poisson      P(x >= n)  = P(n, lambda)
+//! ```
+//!
+//! Source: M. Abramowitz and I. Stegun, *Handbook of Mathematical Functions*, 1964, sections 26.2, 26.4 and 6.5.
 
 use statrs::function::{erf, gamma};
 

@@ -1,4 +1,13 @@
 //! Autocorrelation of the residual.
+//!
+//! With the autocorrelations r_k of n samples, `n r_k^2` is asymptotically chi-square with one degree of freedom for
+//! white noise, and independent for different k. Ljung and Box weigh the lags by `(n + 2) / (n - k)`, which makes the
+//! sum Q nearly chi-square with m degrees of freedom for m lags also for moderate n (G. M. Ljung and G. E. P. Box, *On
+//! a measure of lack of fit in time series models*, Biometrika 65, 1978). No degrees are subtracted for the parameters
+//! of the model, because it is fitted to the output and not to the autocorrelation of e.
+//!
+//! With n in the millions, correlations of no practical size are significant. The threshold is therefore at least
+//! `small n`, which is reached where `sum_k r_k^2` is about `small`.
 
 use super::compared::Compared;
 use super::outcome::{ResidualTest, WHITENESS, points_to};

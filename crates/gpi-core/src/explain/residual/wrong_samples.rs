@@ -1,4 +1,8 @@
 //! Isolated wrong samples.
+//!
+//! Of K scored samples of Gaussian noise, `2e-9 K` lie beyond six standard deviations, so that the count is Poisson
+//! with that mean. The threshold is a number of samples, not a probability: one or two wrong samples of a record need
+//! no cause.
 
 use super::compared::Compared;
 use super::outcome::{ResidualTest, points_to};
