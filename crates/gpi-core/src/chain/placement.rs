@@ -2,8 +2,9 @@
 //!
 //! Adding a play of half-width r and weight p adds `p F_r` to v; adding a deadzone of threshold eta and slope g adds
 //! `g Z_eta(u)` to z. With p or g zero, the output is unchanged, and only the derivatives by the new values are new.
-//! Removing one of weight zero changes nothing either. All other operations of this file keep the output to a tolerance
-//! that each states.
+//! Removing one of weight zero changes nothing either, nor does moving a play of weight zero. Deadzones that are joined
+//! change z within a bound that [`Point::drop_unused`] states; a deadzone that is silenced changes the output until the
+//! next fit.
 
 use super::point::Point;
 use super::table::{Group, Table};

@@ -9,13 +9,14 @@
 //! v(k) = sum_i sum_s p_is F_{r_i, s}(k),    p_is >= 0,    r_i = i/n of half the span of z,    s = -1, 0, 1
 //! ```
 //!
-//! with `F_{r, s}(-1) = z(0) + s r`. They are fitted to y together with the envelope's slopes, the offsets, the state of G
-//! and the zeros of G; the poles, the thresholds and the effects are held. Two thirds of the columns are needed only
-//! until the plays have lost their initial state, where a mixture of starts resembles a start in between.
+//! with `F_{r, s}(-1) = z(0) + s r`. The weights are fitted to y together with the envelope's slopes, the offsets, the
+//! unknown states of G and of sections in parallel, the values of the effects and the zeros of G. The poles and the
+//! thresholds are held. The plays of one r differ only until they have lost their initial state; until then, a weighted
+//! sum of them approximates a play with an initial place in between.
 //!
 //! Non-negative least squares leaves few weights above zero. A play of the stage between two grid points gets the weight of
 //! both, so that neighbours on the grid become one play: their weights add up, and r and s are the weighted means. The
-//! result is a start for the joint fit, which knows no grid.
+//! result is a start for the joint fit, which moves half-widths and initial places freely.
 //!
 //! Source: C. Lawson and R. Hanson, Solving Least Squares Problems, 1974, chapter 23, for the active set that makes the
 //! solution sparse.
@@ -28,7 +29,6 @@ use crate::fit::joint::fit_options;
 use crate::fit::minimize::fit;
 use crate::fit::preparation::Prepared;
 use crate::fit::settings::DenseSettings;
-use crate::optimize::Loss;
 use crate::progress::Progress;
 
 /// A play: its half-width, its weight and, in each experiment of unknown initial state, its initial place.
@@ -39,13 +39,10 @@ struct Play {
     sides: Vec<f64>,
 }
 
-/// The point with the plays that a dense grid asks for, before a joint fit.
-///
-/// `loss` weighs the outputs. The plays of all inputs are placed anew.
+/// The point with the plays of all inputs chosen anew on a dense grid, before a joint fit.
 pub(crate) fn dense(
     point: &Point,
     prepared: &Prepared,
-    loss: &Loss,
     progress: Progress,
 ) -> Result<Point, Error> {
     let settings = &prepared.settings.dense;
@@ -56,14 +53,13 @@ pub(crate) fn dense(
         spread(&mut rich, input, step, settings);
     }
     let mut options = fit_options(prepared, &RefineOptions::default(), settings.steps);
-    options.loss = loss.clone();
     options.gain = settings.gain;
     options.freedom.identity = false;
     options.freedom.dynamics = DynamicsFreedom::Numerator;
     options.freedom.derivatives.starts = false;
     let mut found = fit(rich, &prepared.record, &options, "dense grid", progress)?.point;
     for (input, &step) in steps.iter().enumerate() {
-        gather(&mut found, input, step);
+        join_neighbours(&mut found, input, step);
     }
     Ok(found)
 }
@@ -71,79 +67,66 @@ pub(crate) fn dense(
 /// Puts the dense grid in place of the plays of an input. Each play's weight goes to the nearest one.
 fn spread(point: &mut Point, input: usize, step: f64, settings: &DenseSettings) {
     let known = plays(point, input);
-    let is_unknown = point.pasts.iter().any(|past| past.plays.is_some());
-    let starts = if is_unknown { &settings.starts[..] } else { &settings.starts[1..2] };
-    let grid = (1..settings.half_widths).flat_map(|i| starts.iter().map(move |&s| (i, s)));
-    let unknown = point.pasts.iter().filter(|past| past.plays.is_some()).count();
-    let mut dense = vec![Play { half_width: 0.0, weight: 0.0, sides: vec![0.0; unknown] }];
-    dense.extend(grid.map(|(place, side)| Play {
-        half_width: step * place as f64,
-        weight: 0.0,
-        sides: vec![side; unknown],
-    }));
-    for play in known {
-        let mean = play.sides.iter().sum::<f64>() / unknown.max(1) as f64;
-        let distance = |other: &Play| {
-            let apart = (other.half_width - play.half_width).abs() / step;
-            let side = other.sides.first().map_or(0.0, |side| (side - mean).abs());
-            // the half-width decides, the initial place only between equal ones
-            apart + 1e-3 * side
+    let unknown = known[0].sides.len();
+    // where every initial state is known, one play of each half-width is enough
+    let starts = if unknown > 0 { &settings.starts[..] } else { &settings.starts[..1] };
+    let play =
+        |half_width: f64, side: f64| Play { half_width, weight: 0.0, sides: vec![side; unknown] };
+    let grid = (1..settings.half_widths).map(|place| step * place as f64);
+    let plays_of = |half_width: f64| starts.iter().map(move |&side| play(half_width, side));
+    let mut dense = vec![play(0.0, 0.0)];
+    dense.extend(grid.flat_map(plays_of));
+    for own in known {
+        let apart = |other: &Play| (other.half_width - own.half_width).abs();
+        let turned = |other: &Play| {
+            let sides = other.sides.iter().zip(&own.sides);
+            sides.map(|(other, own)| (other - own).abs()).sum::<f64>()
         };
-        let nearest =
-            (0..dense.len()).min_by(|&a, &b| distance(&dense[a]).total_cmp(&distance(&dense[b])));
+        // of equal half-widths, the one of the nearest initial place
+        let nearest = dense.iter_mut().min_by(|a, b| {
+            apart(a).total_cmp(&apart(b)).then_with(|| turned(a).total_cmp(&turned(b)))
+        });
         if let Some(nearest) = nearest {
-            dense[nearest].weight += play.weight;
+            nearest.weight += own.weight;
         }
     }
     set_plays(point, input, &dense);
 }
 
 /// Joins the plays of one half-width, then those of two neighbours on the grid, and leaves out those without weight.
-fn gather(point: &mut Point, input: usize, step: f64) {
+fn join_neighbours(point: &mut Point, input: usize, step: f64) {
     let mut used = plays(point, input).into_iter();
     let linear: Vec<Play> = used.by_ref().take(1).collect();
     let used: Vec<Play> = used.filter(|play| play.weight > 0.0).collect();
-    let apart = |own: &Play, other: &Play| other.half_width - own.half_width;
-    let one_each = joined(used, |run| apart(&run[0], &run[run.len() - 1]) < 0.5 * step);
-    let pairs =
-        joined(one_each, |run| run.len() < 3 && apart(&run[0], &run[run.len() - 1]) < 1.5 * step);
+    let is_within =
+        |run: &[Play], play: &Play, reach: f64| play.half_width - run[0].half_width < reach * step;
+    // half-widths of the grid are whole steps apart
+    let one_each = joined(used, |run, play| is_within(run, play, 0.5));
+    let pairs = joined(one_each, |run, play| run.len() < 2 && is_within(run, play, 1.5));
     set_plays(point, input, &[linear, pairs].concat());
 }
 
-/// Joins runs of plays, each as long as `is_one` accepts it.
-fn joined(plays: Vec<Play>, is_one: impl Fn(&[Play]) -> bool) -> Vec<Play> {
+/// Joins runs of plays; `belongs` tells whether a play continues the run before it.
+fn joined(plays: Vec<Play>, belongs: impl Fn(&[Play], &Play) -> bool) -> Vec<Play> {
     let mut runs: Vec<Vec<Play>> = Vec::new();
     for play in plays {
-        if let Some(run) = runs.last_mut() {
-            run.push(play);
-            if is_one(run) {
-                continue;
-            }
-            let Some(play) = run.pop() else { continue };
-            runs.push(vec![play]);
-        } else {
-            runs.push(vec![play]);
+        match runs.last_mut() {
+            Some(run) if belongs(run, &play) => run.push(play),
+            _ => runs.push(vec![play]),
         }
     }
-    let one = |run: Vec<Play>| {
-        run.into_iter().reduce(|mut own, other| {
-            join(&mut own, &other);
-            own
-        })
-    };
-    runs.into_iter().filter_map(one).collect()
+    runs.into_iter().filter_map(|run| run.into_iter().reduce(sum)).collect()
 }
 
-/// Adds a play to another one.
-fn join(own: &mut Play, other: &Play) {
+/// One play in place of two: the sum of the weights, and the weighted means of half-width and initial places.
+fn sum(mut own: Play, other: Play) -> Play {
     let all = own.weight + other.weight;
-    let part = if all > 0.0 { other.weight / all } else { 0.5 };
+    let part = other.weight / all;
     own.half_width += part * (other.half_width - own.half_width);
-    own.sides
-        .iter_mut()
-        .zip(&other.sides)
-        .for_each(|(side, other)| *side += part * (other - *side));
-    own.weight = all;
+    for (side, other) in own.sides.iter_mut().zip(other.sides) {
+        *side += part * (other - *side);
+    }
+    Play { weight: all, ..own }
 }
 
 fn plays(point: &Point, input: usize) -> Vec<Play> {
@@ -213,7 +196,7 @@ mod tests {
             ((found.linearization.cost / 4000.0).sqrt(), found.point)
         };
         let (alone, _) = fitted(point.clone());
-        let rich = dense(&point, &prepared, &Loss::squares(1), &mut |_, _| true).unwrap();
+        let rich = dense(&point, &prepared, &mut |_, _| true).unwrap();
         let (rms, found) = fitted(rich);
         assert!(rms < 0.2 * alone, "{rms} {alone}");
         // the weights of all plays around each true one
@@ -234,7 +217,7 @@ mod tests {
             weight,
             sides: vec![side],
         };
-        let near = |run: &[Play]| run[run.len() - 1].half_width - run[0].half_width < 1.5;
+        let near = |run: &[Play], play: &Play| play.half_width - run[0].half_width < 1.5;
         let found =
             joined(vec![play(1.0, 0.1, -1.0), play(2.0, 0.3, 1.0), play(5.0, 0.2, 0.0)], near);
         assert_eq!(found.len(), 2);

@@ -13,6 +13,7 @@ use crate::fit::certainty;
 use crate::fit::joint::Refined;
 use crate::fit::minimize::{FitOptions, Fitted, fit};
 use crate::fit::preparation::Prepared;
+use crate::fit::problem::residual_rms;
 use crate::fit::refinement::{Parameter, Refinement};
 use crate::fit::sensitivities::names_and_values;
 use crate::progress::{Progress, report};
@@ -97,22 +98,13 @@ impl Refined {
         let covariance = Matrix::from_fn(estimated.len(), estimated.len(), |i, j| {
             uncertainty.covariance[(estimated[i], estimated[j])]
         });
-        let mut squares = vec![0.0; prepared.means.len()];
-        for (residual, experiment) in residuals.iter().zip(record.experiments()) {
-            for scored in experiment.scored_rows(residual) {
-                for (sum, column) in squares.iter_mut().zip(scored.column_iter()) {
-                    *sum += column.norm_squared();
-                }
-            }
-        }
-        let rms = |sum: f64| (sum / record.scored() as f64).sqrt();
         Ok(Refinement {
             status,
             history: history.iter().map(|cost| (cost / values).sqrt()).collect(),
             parameters: estimated.iter().map(parameter).collect(),
             covariance,
             undetermined: uncertainty.undetermined(&names),
-            residual_rms: squares.into_iter().map(rms).collect(),
+            residual_rms: residual_rms(&residuals, record),
             noise_floor: NoiseFloor::estimate(record, &residuals),
             residuals,
             outliers: self.outliers,

@@ -121,6 +121,15 @@ pub(crate) fn scored<'a>(
     runs.flat_map(|(residual, experiment)| experiment.scored_rows(residual))
 }
 
+/// Root mean square of the scored residual of each output.
+pub(crate) fn residual_rms(residuals: &[Matrix], record: &Record) -> Vec<f64> {
+    let squares = |output: usize| -> f64 {
+        scored(residuals, record).map(|run| run.column(output).norm_squared()).sum()
+    };
+    let rms = |output: usize| (squares(output) / record.scored() as f64).sqrt();
+    (0..record.outputs().len()).map(rms).collect()
+}
+
 /// Adds a block of rows to the equations; returns its cost.
 fn add(equations: &mut NormalEquations, rows: Rows, loss: &Loss) -> f64 {
     let mut cost = 0.0;

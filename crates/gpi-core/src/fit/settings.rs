@@ -57,8 +57,7 @@ settings! {
 
     /// Plays on a dense grid, see [`dense`](super::dense).
     struct DenseSettings {
-        /// Half-widths. On a clean plant with an unknown initial state and five plays between 30 and 39 V, 40 leave 1.03
-        /// times the noise and 60 leave 1.01 times.
+        /// Half-widths, zero included. By hand: the joint fit moves the plays from there.
         half_widths: usize = 60, FROM_ONE;
         /// Initial places of the plays between z - r (-1) and z + r (1): both ends and the middle, between which
         /// mixtures lie.

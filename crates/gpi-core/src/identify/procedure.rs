@@ -65,7 +65,7 @@ pub(crate) fn prepare<'a>(
     Prepared::new(record, channels(record, options)?)
 }
 
-/// Seeds and compares structures; `fast` rules slow poles out.
+/// Seeds and compares structures; `fast` rules slow poles out, and leaves the dense grid out.
 pub(crate) fn compare(
     prepared: &mut Prepared,
     options: &IdentifyOptions,
@@ -148,8 +148,8 @@ pub(crate) fn compare(
     compared(search, false, stages, supported)
 }
 
-/// Tries the plays of a dense grid, unless `fast`: a search for effects refines its grid later, and so many plays can take the
-/// place of an effect such as loops that open with speed.
+/// Tries the plays of a dense grid, unless `fast`: a search for effects refines its grid later, and so many plays can
+/// take the place of an effect.
 fn enrich(search: &mut StructureSearch, fast: bool, progress: Progress) -> Result<(), Error> {
     if fast { Ok(()) } else { search.enrich(progress) }
 }

@@ -7,12 +7,12 @@ use crate::fit::dense::dense;
 use crate::fit::joint::{Refined, fit_options};
 use crate::fit::minimize::fit;
 use crate::fit::preparation::{Prepared, rescale};
+use crate::fit::problem::residual_rms;
 use crate::fit::{Grid, RefineOptions};
 use crate::identify::criterion::Comparison;
 use crate::identify::identification::{Candidate, IdentifyOptions};
 use crate::identify::settings::StructurePolicy;
 use crate::linear::Sections;
-use crate::optimize::Loss;
 use crate::progress::Progress;
 use crate::uncertainty::noise_floor::NoiseFloor;
 use crate::{Error, Record};
@@ -166,14 +166,19 @@ impl<'a> StructureSearch<'a> {
         let Some(point) = self.comparison.best().cloned() else { return Ok(()) };
         let is_given = matches!(self.half_widths, Some(Grid::Values(_)));
         let residuals = point.residuals(&prepared.record)?;
-        let noise = NoiseFloor::estimate(&prepared.record, &residuals);
-        if is_given || noise.is_reached_by(&residuals, &prepared.record, policy.near_noise) {
+        let noise = NoiseFloor::estimate(&prepared.record, &residuals).rms;
+        let left = residual_rms(&residuals, &prepared.record);
+        let is_noise =
+            left.iter().zip(noise).all(|(left, noise)| *left <= policy.near_noise * noise);
+        if is_given || is_noise {
             return Ok(());
         }
-        let loss = Loss::squares(prepared.means.len());
-        let rich = dense(&point, prepared, &loss, progress)?;
-        self.comparison.offer(rich, progress)?;
-        Ok(())
+        let rich = dense(&point, prepared, progress)?;
+        match self.comparison.offer(rich, progress) {
+            // a record too short for so many plays has its model already
+            Err(Error::TooFewSamples { .. }) => Ok(()),
+            offered => offered.map(|_| ()),
+        }
     }
 
     /// The seed's dynamics behind a hysteresis on new grids, fitted with the poles kept.

@@ -75,17 +75,6 @@ impl NoiseFloor {
             .unwrap_or_else(|| Self::from_residuals(record, residuals))
     }
 
-    /// Whether the scored residual of every output is at most `factor` times its noise.
-    pub(crate) fn is_reached_by(&self, residuals: &[Matrix], record: &Record, factor: f64) -> bool {
-        let squares = |output: usize| -> f64 {
-            let runs = residuals.iter().zip(record.experiments());
-            let scored = runs.flat_map(|(residual, experiment)| experiment.scored_rows(residual));
-            scored.map(|run| run.column(output).norm_squared()).sum()
-        };
-        let most = |rms: f64| (factor * rms).powi(2) * record.scored() as f64;
-        self.rms.iter().enumerate().all(|(output, &rms)| squares(output) <= most(rms))
-    }
-
     fn from_periods(record: &Record, residuals: &[Matrix]) -> Option<Self> {
         let mut squares = DVector::zeros(record.outputs().len());
         let (mut count, mut shortest) = (0.0, usize::MAX);
