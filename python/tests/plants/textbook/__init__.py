@@ -102,8 +102,10 @@ def draw(name: str, seed: int, number: int = 0) -> Record:
     """Experiment `number` on the stage `name` of a seed."""
     kind = STAGES[name]
     random = stream("textbook " + name, seed)
-    rate = float(random.choice([1000.0, 2000.0, 4000.0] if kind.seconds == 0 else [1000.0, 2000.0]))
-    samples = max(int(random.integers(12_000, 20_000)), round(kind.seconds * rate))
+    rate = float(random.choice([1000.0, 2000.0, 4000.0]))
+    if kind.seconds:
+        rate = 1000.0
+    samples = max(int(random.integers(7_000, 12_000)), round(kind.seconds * rate))
     volts = float(random.choice([10.0, 60.0, 100.0, 150.0]))
     resonance = rate * random.uniform(0.03, 0.08)
     travel = float(np.exp(random.uniform(np.log(5), np.log(60))))

@@ -97,7 +97,7 @@ class BoucWen:
 
     def change(self, z: float, dx: float) -> float:
         """dz for a small dx."""
-        size = abs(z) ** self.power
+        size = math.pow(abs(z), self.power)
         return dx - abs(dx) * self.beta * math.copysign(size, z) - dx * self.gamma * size
 
     def step(self, dx: float, seconds: float) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.random import Generator
@@ -88,8 +87,7 @@ def bouc_wen_spring(random: Generator, drive: Drive) -> Run:
 def motor(random: Generator, drive: Drive) -> Run:
     """A motor-driven slide: T v' = u - v - c tanh(v / v_0) - s exp(-(v / v_s)^2) tanh(v / v_0), x' = v [1].
 
-    Viscous, Coulomb and Stribeck friction; nothing holds the slide's place. The drive's mean is removed, so
-    that the slide stays on its bench.
+    Viscous, Coulomb and Stribeck friction; nothing holds the slide's place.
 
     1. Olsson, Astrom, Canudas de Wit, Gafvert, Lischinsky, Friction models and friction compensation,
        European Journal of Control 4, 1998.
@@ -97,21 +95,19 @@ def motor(random: Generator, drive: Drive) -> Run:
     # so slow that the slide follows speed, not force
     time = random.uniform(3, 15) / drive.resonance
     coulomb = random.uniform(0.05, 0.2)
-    extra, stribeck, smooth = random.uniform(0.0, 0.5) * coulomb, random.uniform(0.03, 0.1), 0.005
+    extra, stribeck, smooth = random.uniform(0.0, 0.5) * coulomb, random.uniform(0.03, 0.1), 0.001
     steps = math.ceil(2 * coulomb / smooth / time / drive.rate) + 2
     h = 1 / drive.rate / steps
     speed = x = 0.0
     motion = []
-    signal = drive.unit - drive.unit.mean()
-    for value in signal.tolist():
+    for value in drive.unit.tolist():
         motion.append(x)
         for _ in range(steps):
             ratio = speed / stribeck
             friction = (coulomb + extra * math.exp(-ratio * ratio)) * math.tanh(speed / smooth)
             speed += h / time * (value - speed - friction)
             x += h * speed
-    found = scaled(random, drive, REACH * np.array(motion))
-    return replace(found, u=drive.volts * signal)
+    return scaled(random, drive, REACH * np.array(motion))
 
 
 def hydraulic(random: Generator, drive: Drive) -> Run:
@@ -123,7 +119,6 @@ def hydraulic(random: Generator, drive: Drive) -> Run:
     """
     w, damping = 2 * np.pi * drive.resonance, random.uniform(0.05, 0.3)
     overlap = random.uniform(0.0, 0.04)
-    signal = drive.unit - drive.unit.mean()
-    flow = np.sign(signal) * np.maximum(np.abs(signal) - overlap, 0)
+    flow = np.sign(drive.unit) * np.maximum(np.abs(drive.unit) - overlap, 0)
     x = held([w * w], [1.0, 2 * damping * w, w * w, 0.0], drive.rate, flow)
-    return replace(scaled(random, drive, REACH * x), u=drive.volts * signal)
+    return scaled(random, drive, REACH * x)

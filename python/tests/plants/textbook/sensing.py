@@ -64,7 +64,7 @@ def burst(random: Generator, drive: Drive) -> Run:
     rms, height = noise_rms(random, drive), random.uniform(0.7, 2.5)
     up, down = np.exp(random.uniform(np.log(0.02), np.log(0.5), 2))
     jumps = telegraph(drive.random("bursts"), len(x), drive.rate, up, down)
-    total = rms * float(np.hypot(1, height * drive.recorded(jumps).std()))
+    total = rms * float(np.hypot(1, height * 2 * np.sqrt(up * down) / (up + down)))
     return Run(drive.u, x + white(drive, rms) + rms * height * jumps, total)
 
 

@@ -28,8 +28,8 @@ def log_creep(v: Array, rate: float, per_decade: float, first: float) -> Array:
 def heat(random: Generator, drive: Drive) -> Array:
     """A smooth function of time: bodies of lumped capacity in a room whose temperature swings [1, ch. 5].
 
-    theta(t) = sum_i a_i exp(-t / tau_i) + b sin(2 pi t / T), tau_i and T at least 0.4 of the record; scaled to
-    mean 0 and rms 1 over the record.
+    theta(t) = sum_i a_i exp(-t / tau_i) + b sin(2 pi t / T), tau_i and T at least 0.4 of the record; it is
+    scaled to mean 0 and rms 1 over the record.
 
     1. Incropera, DeWitt, Fundamentals of Heat and Mass Transfer, 5th ed., Wiley, 2002.
     """
