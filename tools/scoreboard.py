@@ -1,7 +1,7 @@
 """Print how often `explain` names the right effects, and the error before and after.
 
 The records are those with labels under `blind/dev` and `blind/foreign` of the data folder (`GPI_DATA_DIR`,
-else `../shared`), and plants of the tests' simulator that are drawn at random.
+else `../shared`), plants of the tests' simulator that are drawn at random, and stages of other textbooks.
 `python tools/scoreboard.py --help` lists the options.
 """
 
@@ -21,9 +21,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "tests")
 
 import plants  # noqa: E402  the simulator that the tests use
 import score_tables  # noqa: E402
+import textbook_tables  # noqa: E402
 from data_folder import DEV, FOREIGN  # noqa: E402
 from gpi_hammerstein.files import write_atomically  # noqa: E402
-from scores import Result, foreign, labelled, simulated  # noqa: E402
+from plants import textbook  # noqa: E402
+from scores import Result, foreign, labelled, of_textbook, simulated  # noqa: E402
 
 # Effects of the simulated plants. G's order and delay are left out: here, the declared model contains them.
 SINGLE = [name for name in plants.CATALOGUE if name not in ("delay", "linear-dynamics")]
@@ -108,6 +110,17 @@ def power_work(arguments: argparse.Namespace) -> Iterator[Job]:
                 yield simulated, (arguments.seed + number, (name,), strength, arguments.seconds)
 
 
+def textbook_work(arguments: argparse.Namespace) -> Iterator[Job]:
+    """Yield some seeds of every stage of another textbook; every second one starts in motion."""
+    for name in textbook.STAGES:
+        # a whole name means this stage alone
+        if arguments.only == name or (
+            arguments.only not in textbook.STAGES and (arguments.only or "") in name
+        ):
+            seeds = range(arguments.seed, arguments.seed + arguments.textbook)
+            yield from ((of_textbook, (name, seed)) for seed in seeds)
+
+
 def run(pool: Executor, work: Iterable[Job], kept: Kept) -> list[Result]:
     """Run the jobs whose results are not in the file, and print one line for each record, in order."""
     jobs = [(job, None if kept.find(job) else pool.submit(job[0], *job[1])) for job in work]
@@ -120,11 +133,19 @@ def run(pool: Executor, work: Iterable[Job], kept: Kept) -> list[Result]:
     return results
 
 
+def reproduced(result: Result) -> str:
+    """Return the command that explains the record of one textbook stage again."""
+    seed = result.name.split(",")[0].split()[-1]
+    return (
+        f"python tools/scoreboard.py --no-records --plants 0 --textbook 1 --seed {seed} --only {result.stage}"
+    )
+
+
 def as_markdown(tables: Iterable[score_tables.Table]) -> str:
     """Return the tables, below the command that made them."""
     words = iter(sys.argv[1:])
-    # the file of earlier results does not change the tables
-    told = [word for word in words if word != "--keep" or next(words) is None]
+    # the file of earlier results and the number of processes do not change the tables
+    told = [word for word in words if word not in ("--keep", "--processes") or next(words) is None]
     command = shlex.join(["python", "tools/scoreboard.py", *told])
     return "\n".join([f"# Scoreboard\n\nMade by `{command}`.\n", *(table.markdown() for table in tables)])
 
@@ -141,7 +162,25 @@ def main() -> None:
     parser.add_argument(
         "--no-records", dest="records", action="store_false", help="leave out the labelled records"
     )
-    parser.add_argument("--only", metavar="TEXT", help="only the labelled records whose name contains this")
+    parser.add_argument(
+        "--only",
+        metavar="TEXT",
+        help="only the labelled records and textbook stages whose name contains this",
+    )
+    parser.add_argument(
+        "--textbook",
+        type=int,
+        default=0,
+        metavar="N",
+        help="N seeds of every stage of other textbooks; odd seeds start in motion",
+    )
+    parser.add_argument(
+        "--processes",
+        type=int,
+        default=os.cpu_count(),
+        metavar="N",
+        help="number of records at the same time",
+    )
     parser.add_argument(
         "--effects",
         nargs="+",
@@ -166,17 +205,21 @@ def main() -> None:
     arguments = parser.parse_args()
     kept = Kept(arguments.keep)
     print(HEAD, flush=True)
-    with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
+    with ProcessPoolExecutor(max_workers=arguments.processes) as pool:
         mixed = run(pool, mixed_work(arguments), kept)
         near_noise = run(pool, power_work(arguments) if arguments.power else [], kept)
+        other = run(pool, textbook_work(arguments), kept)
     tables = []
     if mixed:
         tables += [score_tables.singles(mixed), score_tables.by_number(mixed), score_tables.summary(mixed)]
     if near_noise:
         tables.append(score_tables.power(near_noise))
+    if other:
+        tables += [textbook_tables.by_stage(other), textbook_tables.totals(other)]
+        tables.append(textbook_tables.mistakes(other, reproduced))
     for table in tables:
         print(table.text())
-    seconds = [result.seconds for result in (*mixed, *near_noise)]
+    seconds = [result.seconds for result in (*mixed, *near_noise, *other)]
     if seconds:
         print(f"\ntime: median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s")
     if arguments.markdown is not None:

@@ -1,17 +1,21 @@
 """The answer of `explain` on one record whose effects are known, and its score."""
 
 import json
+import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 import gpi_hammerstein as gpi
 import plants
+from plants import textbook
 
 # Effects whose name in the labels differs from that in the catalogue.
 ALSO = {"duffing": "stiffness", "preisach": "hysteresis-shape"}
+# Verdict where the record was rejected.
+REFUSED = "refused"
 # Held-out error over the noise up to which nothing is left to be named.
 ABSORBED = 1.05
 
@@ -20,7 +24,8 @@ ABSORBED = 1.05
 class Result:
     """The result of one record: errors over the noise, and the strength of a single effect, if given.
 
-    ``again`` is the error on another experiment, NaN where there is none.
+    ``again`` is the error on another experiment, NaN where there is none; ``stage`` is the name of a stage of
+    another textbook.
     """
 
     name: str
@@ -34,6 +39,7 @@ class Result:
     is_outside: bool = False
     strength: float | None = None
     may: tuple[str, ...] | None = None
+    stage: str | None = None
 
     def is_right(self) -> bool:
         """Return whether the effects are those of the label.
@@ -41,10 +47,15 @@ class Result:
         A label with effects that may be named (records of other simulators) does not ask for an effect that
         the declared model has explained down to the noise.
         """
+        if self.verdict == REFUSED:
+            return False
         if self.may is None:
             return sorted(self.wanted) == sorted(self.found)
-        is_absorbed = self.after <= ABSORBED
-        return not self.has_false() and (set(self.wanted) <= set(self.found) or is_absorbed)
+        return not self.has_false() and (set(self.wanted) <= set(self.found) or self.is_absorbed())
+
+    def is_absorbed(self) -> bool:
+        """Return whether the error is down to the noise, so that nothing is left to be named."""
+        return self.after <= ABSORBED
 
     def has_false(self) -> bool:
         """Return whether an effect was named that is not present."""
@@ -121,6 +132,28 @@ def simulated(seed: int, effects: tuple[str, ...], strength: float | None, secon
     wanted = () if is_outside else effects
     name = f"plant {seed} {'+'.join(plant.effects) if is_outside else ''}".strip()
     return explained(name, wanted, record, again, plant.noise_std, is_outside=is_outside, strength=strength)
+
+
+def of_textbook(stage: str, seed: int) -> Result:
+    """Explain one record of a stage of another textbook; the label says what must and what may be named."""
+    label = textbook.STAGES[stage]
+    one, two = (textbook.draw(stage, seed, number) for number in (0, 1))
+    record, again = (
+        gpi.Record(
+            run.u, run.y, rate=run.rate, covariates=run.columns, input_units=["V"], output_units=["um"]
+        )
+        for run in (one, two)
+    )
+    name = f"{stage} {seed}{', in motion' if one.in_motion else ''}"
+    must, may = tuple(sorted(label.must)), tuple(sorted(label.may))
+    is_outside = not must and bool(may)
+    try:
+        result = explained(name, must, record, again, one.noise, is_outside=is_outside, may=may)
+    except gpi.GpiError as refusal:
+        print(f"{name}: {refusal}", file=sys.stderr, flush=True)
+        nothing = (np.nan, np.nan, np.nan, np.nan)
+        result = Result(name, must, (), REFUSED, *nothing, is_outside=is_outside, may=may)
+    return replace(result, stage=stage)
 
 
 def as_record(run: plants.Recording) -> gpi.Record:

@@ -1,5 +1,6 @@
 """The scoreboard counts what it says."""
 
+import argparse
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -7,7 +8,9 @@ import pytest
 
 import score_tables
 import scoreboard
-from scores import Result
+import textbook_tables
+from plants import textbook
+from scores import REFUSED, Result
 
 
 def result(
@@ -111,3 +114,56 @@ def test_what_was_kept_is_not_done_again(tmp_path: Path) -> None:
         results = scoreboard.run(pool, [(work, (1,)), (work, (2,))], again)
     assert len(results) == 2
     assert calls == [1, 2]
+
+
+def of_stage(stage: str, seed: int, wanted: str, found: str, after: float, may: str = "") -> Result:
+    """One answer on a stage of another textbook."""
+    name = f"{stage} {seed}{', in motion' if seed % 2 else ''}"
+    names = (tuple(wanted.split()), tuple(found.split()))
+    verdict = REFUSED if found == "refused" else "explained"
+    names = names if found != "refused" else (names[0], ())
+    return Result(name, *names, verdict, 5.0, after, 1.0, 1.0, may=tuple(may.split()), stage=stage)
+
+
+TEXTBOOK = [
+    of_stage("relays", 2, "", "", 9.0, "hysteresis-shape"),
+    of_stage("relays", 3, "", "hysteresis-shape", 2.0, "hysteresis-shape"),
+    of_stage("relays", 4, "", "hysteresis-shape creep", 3.0, "hysteresis-shape"),
+    of_stage("relays", 5, "", "refused", float("nan"), "hysteresis-shape"),
+    of_stage("leak", 2, "covariate", "", 1.04),
+    of_stage("leak", 3, "covariate", "", 1.06),
+    of_stage("leak", 4, "covariate", "drift", 1.0),
+]
+
+
+def test_textbook_answers_are_right_false_or_missed() -> None:
+    assert list(textbook_tables.by_stage(TEXTBOOK[:3] + TEXTBOOK[4:]).rows) == [
+        ("relays", "none", "2 of 3", "1", "0", "1 x creep", "3.00"),
+        ("leak", "covariate", "1 of 3", "1", "1", "1 x drift", "1.04"),
+    ]
+    assert list(textbook_tables.totals(TEXTBOOK).rows) == [
+        ("all", "5 (71 %)", "3 (43 %)", "7"),
+        ("start at rest", "2 (50 %)", "2 (50 %)", "4"),
+        ("start in motion", "3 (100 %)", "1 (33 %)", "3"),
+    ]
+
+
+def test_what_is_not_right_is_listed_with_the_command_that_repeats_it() -> None:
+    rows = textbook_tables.mistakes(TEXTBOOK, scoreboard.reproduced).rows
+    assert [row[0] for row in rows] == ["relays 4", "relays 5, in motion", "leak 3, in motion", "leak 4"]
+    assert rows[0][1:4] == ("none", "hysteresis-shape, creep", "creep")
+    assert rows[-1][-1] == (
+        "`python tools/scoreboard.py --no-records --plants 0 --textbook 1 --seed 4 --only leak`"
+    )
+
+
+def test_the_work_on_textbook_stages() -> None:
+    asked = argparse.Namespace(only=None, textbook=2, seed=10)
+    names = [values for _, values in scoreboard.textbook_work(asked)]
+    assert len(names) == 2 * len(textbook.STAGES)
+    assert names[:2] == [("clean", 10), ("clean", 11)]
+    # a whole name means this stage alone, although it is also a part of another name
+    alone = [
+        values for _, values in scoreboard.textbook_work(argparse.Namespace(only="leak", textbook=1, seed=3))
+    ]
+    assert alone == [("leak", 3)]

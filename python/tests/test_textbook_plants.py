@@ -1,21 +1,26 @@
-"""No false name on stages of other textbooks."""
+"""No false name on stages of other textbooks: one record from rest and one that begins in motion of each."""
 
-import numpy as np
 import pytest
 
 import gpi_hammerstein as gpi
-from textbook_plants import RATE, STAGES
+from plants import textbook
 
 pytestmark = pytest.mark.slow
 
+SEEDS = (1000, 1001)
+# Records with a false name today, and what it is.
+KNOWN: dict[tuple[str, int], str] = {}
 
-@pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("name", STAGES)
+
+def case(name: str, seed: int):
+    """One record; a known failure may pass."""
+    why = KNOWN.get((name, seed))
+    marks = [pytest.mark.xfail(reason=why, strict=False)] if why else []
+    return pytest.param(name, seed, marks=marks, id=f"{name}-{seed}")
+
+
+@pytest.mark.parametrize(("name", "seed"), [case(name, seed) for name in textbook.STAGES for seed in SEEDS])
 def test_nothing_false_is_named(name: str, seed: int) -> None:
-    stage, must, may = STAGES[name]
-    run = stage(np.random.default_rng(seed))
-    columns = {} if run.covariates is None else {"covariates": run.covariates}
-    found = gpi.explain(gpi.Record(run.u, run.y, rate=RATE, **columns))
-    assert set(found.effects) <= must | may
-    assert must <= set(found.effects)
-    assert found.verdict != "explained" or found.after["holdout"]["rms"] < 1.5 * run.noise
+    label, run = textbook.STAGES[name], textbook.draw(name, seed)
+    found = gpi.explain(gpi.Record(run.u, run.y, rate=run.rate, covariates=run.columns))
+    assert set(found.effects) <= label.must | label.may
