@@ -49,6 +49,21 @@ impl NormalEquations {
         }
     }
 
+    /// Adds the equations of a part of the unknowns, `places` ascending.
+    pub(crate) fn add_part(&mut self, part: &Self, places: &[usize]) {
+        for (j, &column) in places.iter().enumerate() {
+            for (i, &row) in places.iter().enumerate() {
+                self.gram[(row, column)] += part.gram[(i, j)];
+            }
+        }
+        for (i, &row) in places.iter().enumerate() {
+            for target in 0..self.rhs.ncols() {
+                self.rhs[(row, target)] += part.rhs[(i, target)];
+            }
+        }
+        self.squares += &part.squares;
+    }
+
     /// Sum of squared residuals of each target at `x`.
     pub(crate) fn residual_squares(&self, x: &Matrix) -> Vector {
         DVector::from_fn(self.squares.len(), |target, _| {
