@@ -1,5 +1,6 @@
 //! Fits of a model to a record: preparation, the least squares problem, the joint fit, and its uncertainty.
 
+mod another_record;
 mod bridge;
 mod certainty;
 mod finish;
@@ -20,6 +21,7 @@ mod sensitivities;
 mod settings;
 
 pub use crate::optimize::Status;
+pub use another_record::{OnAnotherRecord, functions_of_time, on_another_record};
 pub use grid::Grid;
 pub use hysteresis::{HysteresisFit, fit_hysteresis};
 pub use initial_state::residuals_from_fitted_start;
