@@ -1,6 +1,7 @@
 """The rule by which errors on another record are counted, in words.
 
-`Model.on_another_record` documents the rule itself. Commands, their JSON and the report state it beside the number.
+`Model.on_another_record` documents the rule itself. Commands, their JSON and the report state it beside the
+number.
 """
 
 from collections.abc import Sequence
@@ -33,15 +34,15 @@ def rule_in_words(
 
     Examples
     --------
-    >>> rule_in_words(left_out=["drift"])
-    'initial state fitted unless the record begins at rest, offset of the model kept, warm-up not scored, without drift'
+    >>> rule_in_words(fit_start=False, left_out=["drift"])
+    'from the steady state at the first input, offset of the model kept, warm-up not scored, without drift'
     """
     if split:
         start = "initial state as fitted to the training data"
     elif fit_start:
         start = "initial state fitted unless the record begins at rest"
     else:
-        start = "simulated from the steady state at the first input"
+        start = "from the steady state at the first input"
     offset = "mean of the residual removed" if remove_mean else "offset of the model kept"
     without = f", without {', '.join(left_out)}" if left_out else ""
     return f"{start}, {offset}, warm-up not scored{without}"

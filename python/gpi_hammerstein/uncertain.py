@@ -10,8 +10,8 @@ NOT_DETERMINED = "not determined"
 
 # Below a table of residual tests in which a p-value is missing.
 OF_SIZE = (
-    "A test without a p-value has a threshold of practical size: a deviation below it may be significant, but is too "
-    "small to matter."
+    "A test without a p-value has a threshold of practical size: a deviation below it may be significant, "
+    "but is too small to matter."
 )
 
 __all__ = ["BAND", "NOT_DETERMINED", "OF_SIZE", "p_value_in_words", "spread"]

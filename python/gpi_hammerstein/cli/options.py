@@ -81,8 +81,8 @@ FitStart = Annotated[
     bool,
     typer.Option(
         "--fit-start/--no-fit-start",
-        help="Fit the unknown initial state (plays, dynamics) of the tested record, or simulate it from the steady "
-        "state at its first input.",
+        help="Fit the unknown initial state (plays, dynamics) of the tested record, or simulate it from the "
+        "steady state at its first input.",
     ),
 ]
 Out = Annotated[

@@ -52,8 +52,8 @@ def simulate(
 ) -> None:
     """Simulate a model from the input of a record, and compare the result with the output if there is one.
 
-    All effects of the model are simulated. Without --fit-start, each experiment begins in the steady state at its first
-    input, and the output has no influence on the simulation.
+    All effects of the model are simulated. Without --fit-start, each experiment begins in the steady state at
+    its first input, and the output has no influence on the simulation.
 
     Writes simulated.csv to DIR. Its columns are t and y, or t, y1, y2, ..; for several experiments, the first
     column is `experiment`.

@@ -29,7 +29,8 @@ OwnRecord = Annotated[
     bool,
     typer.Option(
         "--own-record",
-        help="The record is the one that the model was fitted to: keep its effects that are functions of time.",
+        help="The record is the one that the model was fitted to: keep its effects that are functions of "
+        "time.",
     ),
 ]
 
@@ -57,9 +58,10 @@ def validate(
 ) -> None:
     """Compute the error of a model on a record, and test its residual for structure.
 
-    The error is counted like that on the held-out record of identify and explain: the unknown initial state is
-    fitted, the offset of the model is kept, and effects that are functions of the time of their own record (drift,
-    disturbances) are left out. Accepts any gpi-model/1 file. Writes validation.json and pictures of the residual to DIR.
+    The error is counted like that on the held-out record of identify and explain: the unknown initial state
+    is fitted, the offset of the model is kept, and effects that are functions of the time of their own record
+    (drift, disturbances) are left out. Accepts any gpi-model/1 file. Writes validation.json and pictures of
+    the residual to DIR.
     """
     model = files.load_model(model_file)
     recording = options.read(
