@@ -66,6 +66,7 @@ RECORDS: dict[str, Callable[[], Pair]] = {
 }
 TOO_LITTLE = {
     "12 samples": "usable samples, but",
+    "60 samples": "usable samples, but",
     "response to nothing": "constant",
 }
 

@@ -89,6 +89,8 @@ impl<'a> Comparison<'a> {
         let costs = usable.map(|(refined, _)| refined.fitted.linearization.cost);
         let hopeless = self.policy.hopeless * costs.fold(f64::INFINITY, f64::min);
         let refined = joint(point, self.prepared, &self.options, hopeless, self.fast, progress)?;
+        // a model of it must exist
+        refined.fitted.point.dynamics.to_state_space()?;
         let uncertainty = refined.uncertainty(&self.prepared.record, progress)?;
         let parameters = uncertainty.estimated;
         let point = &refined.fitted.point;
@@ -121,13 +123,13 @@ impl<'a> Comparison<'a> {
         }
     }
 
-    /// Whether slow poles rule out all candidates, and G of the best one is flat beyond them.
+    /// Whether slow poles rule out all candidates, and G of the best one is flat beyond them; or none could be computed.
     pub(super) fn shows_nothing_fast(&self) -> bool {
         let StructurePolicy { frequencies, flat, .. } = *self.policy;
         if self.has_usable() {
             return false;
         }
-        let Some(best) = self.closest() else { return false };
+        let Some(best) = self.closest() else { return !self.failures.is_empty() };
         let dynamics = &self.refined[best].0.fitted.point.dynamics;
         // twice the corner of the longest lag that is dynamics
         let lowest = (2.0 / longest_lag(self.prepared.record.rate())).min(1.0);

@@ -12,7 +12,10 @@ pub(super) fn rows<'py>(py: Python<'py>, model: &Model) -> PyResult<Vec<Bound<'p
     let describe = |(place, effect): (usize, &Effect)| {
         let row = PyDict::new(py);
         row.set_item("name", effect.name())?;
-        let own = known.get(place).filter(|own| own.name == effect.name()).map(|own| own.parameters.clone());
+        let own = known
+            .get(place)
+            .filter(|own| own.name == effect.name())
+            .map(|own| own.parameters.clone());
         let parameters = own.unwrap_or_else(|| unknown(model, effect));
         let parameters = parameters.iter().map(|one| estimate(py, one));
         row.set_item("parameters", parameters.collect::<PyResult<Vec<_>>>()?)?;
