@@ -7,6 +7,7 @@ import numpy as np
 
 from gpi_hammerstein._native import Explanation, effect_names
 from gpi_hammerstein.stage import stage, stage_in_words
+from gpi_hammerstein.uncertain import NOT_DETERMINED, spread
 
 # Largest number of parameters of an effect in one sentence.
 SHOWN = 6
@@ -38,7 +39,7 @@ def to_dict(found: Explanation) -> dict[str, Any]:
     """
     record, floor = found.record, found.noise_floor
     noise = float(np.sqrt(np.mean(np.square(floor["rms"]))))
-    keys = ("name", "output", "statistic", "threshold", "p_value", "passed", "points_to")
+    keys = ("name", "output", "statistic", "threshold", "p_value", "level", "passed", "points_to")
     return {
         "schema": "gpi-explanation/1",
         "record": {
@@ -54,7 +55,7 @@ def to_dict(found: Explanation) -> dict[str, Any]:
             {
                 **step,
                 "parameters": {
-                    row["name"]: {key: row[key] for key in ("value", "std", "unit")}
+                    row["name"]: {key: row[key] for key in ("value", "std", "unit", "determined")}
                     for row in step["parameters"]
                 },
             }
@@ -199,9 +200,12 @@ def frequency(resonance: Mapping[str, float]) -> str:
 
 
 def number(label: str, row: Mapping[str, Any]) -> str:
-    """Return a parameter with its uncertainty and unit."""
-    spread = f" ± {1.96 * row['std']:.2g}" if row["std"] else ""
-    return f"{label} {row['value']:.4g}{spread}" + (f" {row['unit']}" if row["unit"] else "")
+    """Return a parameter with its uncertainty and unit; without a value if the data do not determine it."""
+    if not row["determined"]:
+        return f"{label} {NOT_DETERMINED}"
+    width = spread(row)
+    unit = f" {row['unit']}" if row["unit"] else ""
+    return f"{label} {row['value']:.4g}" + (f" {width}" if width else "") + unit
 
 
 def join(names: list[str]) -> str:

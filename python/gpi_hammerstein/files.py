@@ -85,7 +85,9 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     Returns
     -------
     Model
-        The model. Its `identification` is not stored in the file and is None.
+        The model. Its `identification` is not stored in the file and is None. Its `refinement` has only the
+        parameters with their standard deviations, the noise floor and the status; it is None if the file has
+        none.
 
     Raises
     ------

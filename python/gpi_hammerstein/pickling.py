@@ -1,7 +1,8 @@
 """Pickling and copying of operators, linear systems, records and models.
 
-A pickled model contains the same as its file: it has no `identification` and no `refinement`. Explanations
-and identifications cannot be pickled. Save their model, or the result of `to_dict()`.
+A pickled model contains the same as its file: it has no `identification`, and of its `refinement` only the
+parameters with their standard deviations, the noise floor and the status. Explanations and identifications
+cannot be pickled. Save their model, or the result of `to_dict()`.
 """
 
 import copyreg

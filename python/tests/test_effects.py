@@ -277,7 +277,12 @@ def test_a_covariate_leaks_in(time_constant):
         pole = np.exp(-1 / (time_constant * RATE))
         leak[-1] = pole * lag(x, time_constant)[-1] + (1 - pole) * x[-1]
     np.testing.assert_allclose(model.simulate(u, covariates=x), chain(u) + 0.4 * leak, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(model.simulate(u), chain(u), rtol=0, atol=1e-10)
+    for missing in (None, np.zeros((len(u), 0))):
+        with pytest.raises(gpi.ParameterError, match="covariates.*covariate.*`x`"):
+            model.simulate(u, covariates=missing)
+    record = gpi.Record(u, chain(u), RATE, covariates=x, covariate_names=["z"])
+    with pytest.raises(gpi.ParameterError, match="z.*covariate.*`x`"):
+        model.error(record)
 
 
 @pytest.mark.parametrize("name", ["drift", "periodic-disturbance"])
@@ -311,7 +316,7 @@ def test_a_model_file_keeps_the_effect(name, tmp_path):
     model.save(tmp_path / "model.json")
     again = gpi.load(tmp_path / "model.json")
     assert again.effects == model.effects and [effect["name"] for effect in again.effects] == [name]
-    assert all(set(row) == {"name", "value", "unit"} for row in again.effects[0]["parameters"])
+    assert all(set(row) == {"name", "value", "std", "unit", "determined"} for row in again.effects[0]["parameters"])
     u = wander()
     np.testing.assert_array_equal(again.simulate(u), model.simulate(u))
 

@@ -1,5 +1,7 @@
 """Files are written whole or not at all; models survive them."""
 
+import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,37 @@ def test_a_model_survives_its_file(tmp_path: Path) -> None:
     model.save(path)
     assert gpi.load(path).to_json() == model.to_json()
     assert [file.name for file in tmp_path.iterdir()] == ["model.json"]
+
+
+def test_standard_deviations_travel_with_the_file(tmp_path: Path) -> None:
+    u = drive()
+    model = gpi.identify(gpi.Record(u, actuator(u), RATE, input_units=["V"], output_units=["um"]))
+    before = model.refinement
+    assert before is not None
+    model.save(tmp_path / "model.json")
+    for again in (gpi.load(tmp_path / "model.json"), pickle.loads(pickle.dumps(model))):
+        after = again.refinement
+        assert after is not None and after.parameters == before.parameters
+        assert (after.status, after.noise_floor) == (before.status, before.noise_floor)
+        np.testing.assert_array_equal(after.residual_rms, before.residual_rms)
+        assert {row["unit"] for row in after.parameters if row["name"].startswith("u.weights")} == {"um/V"}
+        assert any(row["std"] for row in after.parameters)
+        # what is not saved says so
+        for part in ("covariance", "history", "residuals"):
+            with pytest.raises(gpi.ParameterError, match=f"`{part}` is not saved"):
+                getattr(after, part)
+        for part in (after.poles, lambda after=after: after.markov_std(3)):
+            with pytest.raises(gpi.ParameterError, match="not saved"):
+                part()
+
+
+def test_older_model_files_have_no_deviations(tmp_path: Path) -> None:
+    u = drive()
+    described = json.loads(gpi.identify(gpi.Record(u, actuator(u), RATE)).to_json())
+    assert described["schema"] == "gpi-model/1"
+    del described["estimates"]
+    (tmp_path / "model.json").write_text(json.dumps(described))
+    assert gpi.load(tmp_path / "model.json").refinement is None
 
 
 def test_unknown_models_are_refused(tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_a_fitted_start_takes_the_past_out_of_the_error(
 ) -> None:
     model = folder / "model.json"
     for command in ("simulate", "validate"):
-        unknown = call(capsys, command, model, other)
+        unknown = call(capsys, command, model, other, "--no-fit-start")
         fitted = call(capsys, command, model, other, "--fit-start", "-o", tmp_path / command)
         assert unknown["start_fitted"] is False and fitted["start_fitted"] is True
         assert fitted["error"]["rms"] < 0.5 * unknown["error"]["rms"]

@@ -12,7 +12,7 @@ from gpi_hammerstein.cli import run
 from records import RATE, actuator, drive, write_csv
 
 SAMPLES, NOISE = 4000, 0.02
-KEYS = {"name", "output", "statistic", "threshold", "p_value", "passed", "points_to"}
+KEYS = {"name", "output", "statistic", "threshold", "p_value", "level", "passed", "points_to"}
 NAMES = [
     "mean",
     "whiteness",

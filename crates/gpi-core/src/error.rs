@@ -101,6 +101,18 @@ pub enum Error {
         supported: usize,
     },
 
+    /// The output does not depend on the input.
+    #[error(
+        "the output does not respond to the input: the impulse response of {taps} taps, estimated from {samples} samples, \
+         is zero; check that the columns belong together and that the input moves where the output is scored"
+    )]
+    NoResponse {
+        /// Taps of the impulse response.
+        taps: usize,
+        /// Scored samples.
+        samples: usize,
+    },
+
     /// Time stamps decrease or repeat.
     #[error(
         "time stamps do not increase at {count} of the rows, first from {before} s in row {row} to \
@@ -225,6 +237,15 @@ impl Error {
         requirement: impl Into<String>,
     ) -> Self {
         Self::Parameter { name, value: value.to_string(), requirement: requirement.into() }
+    }
+
+    /// The result of one candidate of a search: its failure, such as an impulse response of rank 0 or a decomposition that
+    /// did not converge, drops the candidate. Only an interruption ends the search.
+    pub(crate) fn unless_interrupted<T>(result: Result<T, Self>) -> Result<Result<T, Self>, Self> {
+        match result {
+            Err(Self::Interrupted) => Err(Self::Interrupted),
+            other => Ok(other),
+        }
     }
 
     /// Rejects a value that violates a requirement.

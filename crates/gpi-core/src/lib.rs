@@ -28,6 +28,8 @@ pub mod effects;
 #[cfg(feature = "identify")]
 mod error;
 #[cfg(feature = "identify")]
+mod estimates;
+#[cfg(feature = "identify")]
 pub mod excitation;
 #[cfg(feature = "identify")]
 pub mod explain;
@@ -56,6 +58,8 @@ mod uncertainty;
 
 #[cfg(feature = "identify")]
 pub use error::{Error, ErrorKind};
+#[cfg(feature = "identify")]
+pub use estimates::{EffectEstimates, Estimate, EstimatedNoise, Estimates};
 #[cfg(feature = "identify")]
 pub use model::{Hysteresis, Model, ModelState};
 #[cfg(feature = "identify")]

@@ -1,6 +1,7 @@
 //! The identified model: one hysteresis per input, then the linear dynamics.
 
 use crate::effects::Effect;
+use crate::estimates::Estimates;
 use crate::linear::StateSpace;
 use crate::operators::{Gpi, GpiState, Operator};
 use crate::simulation_error::SimulationError;
@@ -26,6 +27,8 @@ pub struct Model {
     offsets: Vec<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) effects: Vec<Effect>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) estimates: Option<Estimates>,
 }
 
 /// Everything a [`Model`] remembers between two samples.
@@ -60,8 +63,9 @@ impl Model {
         offsets: Vec<f64>,
     ) -> Result<Self, Error> {
         let schema = Self::SCHEMA.to_owned();
-        let effects = Vec::new();
-        let model = Self { schema, rate, inputs, outputs, hysteresis, linear, offsets, effects };
+        let (effects, estimates) = (Vec::new(), None);
+        let model =
+            Self { schema, rate, inputs, outputs, hysteresis, linear, offsets, effects, estimates };
         model.validate()?;
         Ok(model)
     }
@@ -108,6 +112,17 @@ impl Model {
     /// The constant term of each output, in its unit.
     pub fn offsets(&self) -> &[f64] {
         &self.offsets
+    }
+
+    /// How sure the parameters are, where the model was refined or its file says so.
+    pub fn estimates(&self) -> Option<&Estimates> {
+        self.estimates.as_ref()
+    }
+
+    /// The same model with the uncertainty of its parameters, which its file then contains.
+    #[must_use]
+    pub fn with_estimates(self, estimates: Estimates) -> Self {
+        Self { estimates: Some(estimates), ..self }
     }
 
     /// The state of an actuator that was raised from zero to `input` (one value per input) once and
@@ -236,13 +251,20 @@ impl Model {
         self.start(&input.row(0).iter().copied().collect::<Vec<_>>())
     }
 
+    /// Rejects a record that lacks a measured column which an effect is made of.
+    pub(crate) fn require_covariates_of(&self, record: &Record) -> Result<(), Error> {
+        let names: Vec<&str> = record.covariates().iter().map(|own| own.name.as_str()).collect();
+        self.require_covariates(&names)
+    }
+
     /// Measured minus simulated output of every experiment, (samples, outputs), warm-up included.
     ///
     /// # Errors
-    /// Another number of channels than the model's.
+    /// Another number of channels than the model's; a measured column that an effect needs is not in the record.
     pub fn residuals(&self, record: &Record) -> Result<Vec<Matrix>, Error> {
         let outputs = ("record's outputs", record.outputs().len());
         Error::require_equal("outputs", outputs, ("model's outputs", self.outputs.len()))?;
+        self.require_covariates_of(record)?;
         let residual =
             |e: &crate::Experiment| Ok(&e.output - self.simulate_beside(&e.input, &e.covariates)?);
         record.experiments().iter().map(residual).collect()

@@ -17,6 +17,7 @@ from gpi_hammerstein.cli.identification import describe_model
 from gpi_hammerstein.cli.output import console, print_json, progress_bar, say_written
 from gpi_hammerstein.cli.validate import residual_figures
 from gpi_hammerstein.explanation import in_words, join, to_dict
+from gpi_hammerstein.held_out import rule_of
 from gpi_hammerstein.io import read_record
 
 DATA = files("gpi_hammerstein") / "data"
@@ -74,7 +75,7 @@ def tell(screen: Console, found: Explanation, result: dict[str, Any], out: Path 
     for sentence in in_words(explanation, unit):
         screen.print(f"  {escape(sentence)}")
     screen.print("[bold]4 Before and after[/]")
-    screen.print(before_and_after(explanation, unit))
+    screen.print(before_and_after({**explanation, "rule": rule_of(found)}, unit))
     present = [
         f"{name} ({truth['rms_over_noise'][name]:.3g} times the noise)" for name in sorted(truth["effects"])
     ]

@@ -27,6 +27,7 @@ from gpi_hammerstein.cli.output import (
 )
 from gpi_hammerstein.cli.residual import name_pictures, write_residual_pictures
 from gpi_hammerstein.explanation import in_words, to_dict
+from gpi_hammerstein.held_out import rule_of
 from gpi_hammerstein.io import Recording
 
 MODEL = "Model"
@@ -130,7 +131,7 @@ def explain(
     )
     result = to_dict(found)
     result["record"] = describe_record(recording, records)
-    result |= {"holdout": where, "files": []}
+    result |= {"holdout": where, "rule": rule_of(found), "files": []}
     if out is not None:
         name_pictures(result["residual"]["tests"], found.record.output_names)
         page = page_of(found, context.obj, recording.notes) if report else None
@@ -197,7 +198,7 @@ def before_and_after(result: Mapping[str, Any], unit: str) -> Table:
         for when in ("before", "after")
         for part in ("train", "holdout")
     }
-    return error_table(rows, unit)
+    return error_table(rows, unit, f"Simulation error (held out: {result['rule']})")
 
 
 def page_of(found: Explanation, command: str, notes: list[str]) -> str:

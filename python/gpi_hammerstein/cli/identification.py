@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from gpi_hammerstein._native import Identification, Model, Refinement
-from gpi_hammerstein.cli.output import error_table, mean_and_start, say_written
+from gpi_hammerstein.cli.output import error_table, say_written
 
 HOW = {
     "repeated-periods": "from repeated periods of the input",
@@ -119,7 +119,7 @@ def summarise(screen: Console, result: Mapping[str, Any], model: Model, unit: st
         error_table(
             {"fitted": result["error"]["train"], "held out": result["error"]["holdout"]},
             unit,
-            "Simulation error" + mean_and_start(result["mean_removed"], result["start_fitted"]),
+            f"Simulation error (held out: {result['rule']})",
         )
     )
     say_written(screen, out, result["files"])

@@ -20,6 +20,7 @@ from gpi_hammerstein.cli.output import (
     working,
     write_json,
 )
+from gpi_hammerstein.held_out import rule_in_words
 from gpi_hammerstein.io import Recording, raise_warmup
 
 HOLDOUT = "Held-out data"
@@ -100,7 +101,7 @@ def identify(
             show_default=False,
         ),
     ] = None,
-    fit_start: options.FitStart = False,
+    fit_start: options.FitStart = True,
     remove_mean: options.RemoveMean = False,
     out: options.Out = None,
     as_json: options.Json = False,
@@ -137,7 +138,8 @@ def identify(
     if model.identification is not None:
         # Samples that depend on the unknown initial state were not used for the fit, and are not scored.
         train = raise_warmup(train, model.identification.warmups)
-    held_out = None if test is None else model.error(test, remove_mean=remove_mean, fit_start=fit_start)
+    counted: dict[str, Any] = {"fit_start": fit_start, "remove_mean": remove_mean}
+    held_out = None if test is None else model.on_another_record(test, **counted)["error"]
     # The initial state of the training data was part of the fit.
     error = {"train": model.error(train, remove_mean=remove_mean, fit_start=True), "holdout": held_out}
     result = {
@@ -147,6 +149,7 @@ def identify(
         **describe_model(model),
         "mean_removed": remove_mean,
         "start_fitted": fit_start,
+        "rule": rule_in_words(**counted),
         "error": error,
         "files": [],
     }

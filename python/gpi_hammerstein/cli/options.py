@@ -80,8 +80,9 @@ RemoveMean = Annotated[
 FitStart = Annotated[
     bool,
     typer.Option(
-        "--fit-start",
-        help="Fit the unknown initial state (plays, dynamics) of the tested record.",
+        "--fit-start/--no-fit-start",
+        help="Fit the unknown initial state (plays, dynamics) of the tested record, or simulate it from the "
+        "steady state at its first input.",
     ),
 ]
 Out = Annotated[

@@ -130,11 +130,6 @@ def error_table(rows: Mapping[str, Figures], unit: str = "", title: str = "Simul
     return table
 
 
-def mean_and_start(mean_removed: bool, start_fitted: bool) -> str:
-    """Return the part of a title that describes how the error was computed."""
-    return (", mean removed" if mean_removed else "") + (", initial state fitted" if start_fitted else "")
-
-
 def common_unit(record: Record) -> str:
     """Return the unit of the outputs if they have the same unit, else an empty text."""
     units = set(record.output_units)

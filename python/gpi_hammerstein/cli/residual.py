@@ -8,6 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from gpi_hammerstein.cli.output import picture
+from gpi_hammerstein.uncertain import OF_SIZE, p_value_in_words
 
 if TYPE_CHECKING:
     from gpi_hammerstein.plot import Residuals
@@ -65,7 +66,9 @@ def write_residual_pictures(folder: Path, left: "Residuals") -> None:
 
 def tests_table(tests: Sequence[dict[str, Any]]) -> Table:
     """Return a table of the tests."""
-    table = Table(title="Tests of the residual", title_justify="left")
+    table = Table(title="Tests of the residual", title_justify="left", caption_justify="left")
+    if any(test["p_value"] is None for test in tests):
+        table.caption = OF_SIZE
     several = len({test["output"] for test in tests}) > 1
     names = ["output"] * several + ["test", "statistic", "threshold", "p-value", "passed", "points to"]
     for name in names:
@@ -76,7 +79,7 @@ def tests_table(tests: Sequence[dict[str, Any]]) -> Table:
             test["name"],
             f"{test['statistic']:.3g}",
             f"{test['threshold']:.3g}",
-            f"{test['p_value']:.2g}",
+            p_value_in_words(test),
             "yes" if test["passed"] else "[red]no[/]",
             escape(test["points_to"]),
         )

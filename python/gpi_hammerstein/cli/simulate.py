@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 import polars as pl
 import typer
+from numpy.typing import NDArray
 
 from gpi_hammerstein import files
 from gpi_hammerstein._native import DataError, Model, ParameterError, Record
@@ -15,12 +16,13 @@ from gpi_hammerstein.cli.output import (
     console,
     describe_record,
     error_table,
-    mean_and_start,
     print_json,
     say_written,
     working,
 )
+from gpi_hammerstein.held_out import rule_in_words
 from gpi_hammerstein.io import Recording
+from gpi_hammerstein.io.recording import Run
 
 ModelFile = Annotated[
     Path, typer.Argument(metavar="MODEL", help="A model file (model.json).", show_default=False)
@@ -49,6 +51,9 @@ def simulate(
     as_json: options.Json = False,
 ) -> None:
     """Simulate a model from the input of a record, and compare the result with the output if there is one.
+
+    All effects of the model are simulated. Without --fit-start, each experiment begins in the steady state at
+    its first input, and the output has no influence on the simulation.
 
     Writes simulated.csv to DIR. Its columns are t and y, or t, y1, y2, ..; for several experiments, the first
     column is `experiment`.
@@ -81,6 +86,7 @@ def simulate(
         "record": describe_record(recording, records),
         "mean_removed": remove_mean,
         "start_fitted": fit_start,
+        "rule": rule_in_words(fit_start=fit_start, remove_mean=remove_mean),
         "skipped_s": skip,
         "error": error,
         "files": [],
@@ -98,7 +104,7 @@ def simulate(
     if record is None:
         screen.print("The record has no output column, so that no error can be computed.")
     else:
-        title = "Simulation error" + mean_and_start(remove_mean, fit_start)
+        title = f"Simulation error ({rule_in_words(fit_start=fit_start, remove_mean=remove_mean)})"
         screen.print(error_table({"record": error}, common_unit(record), title))
     say_written(screen, out, ["simulated.csv"])
 
@@ -131,23 +137,29 @@ def require_match(model: Model, recording: Recording) -> None:
 
 
 def simulated_table(model: Model, recording: Recording, start: Record | None = None) -> pl.DataFrame:
-    """Return the time and the simulated outputs of all experiments.
+    """Return the time and the simulated outputs of all experiments, with the recording's covariates.
 
     `start` is the record of the same experiments, if their initial states are to be fitted to its outputs.
     """
-    fitted = None
-    if start is not None:
+    if start is None:
+        simulated = [simulated_run(model, run) for run in recording.runs]
+    else:
         residuals = model.residual(start, fit_start=True)
-        fitted = [measured - residual for measured, residual in zip(start.y, residuals, strict=True)]
+        simulated = [measured - residual for measured, residual in zip(start.y, residuals, strict=True)]
     several = len(model.output_names) > 1
     names = [f"y{index + 1}" for index in range(len(model.output_names))] if several else ["y"]
     frames = []
-    for number, run in enumerate(recording.runs):
-        own = model.simulate(run.u) if fitted is None else fitted[number]
-        y = np.asarray(own).reshape(len(run.u), -1)
+    for number, (run, own) in enumerate(zip(recording.runs, simulated, strict=True)):
+        y = own.reshape(len(run.u), -1)
         t = run.start + np.arange(len(run.u)) / recording.rate
         columns = {"t": t, **{name: y[:, index] for index, name in enumerate(names)}}
         if len(recording.runs) > 1:
             columns = {"experiment": np.full(len(run.u), number), **columns}
         frames.append(pl.DataFrame(columns))
     return pl.concat(frames)
+
+
+def simulated_run(model: Model, run: Run) -> NDArray[np.float64]:
+    """Return the simulated outputs of one experiment, from a steady state."""
+    covariates = run.covariates if run.covariates.shape[1] else None
+    return model.simulate(run.u, covariates=covariates)

@@ -1,8 +1,9 @@
 """`gpi validate`: the error of a model on a record, and tests of its residual."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 from rich.markup import escape
 
@@ -14,7 +15,6 @@ from gpi_hammerstein.cli.output import (
     console,
     describe_record,
     error_table,
-    mean_and_start,
     print_json,
     say_written,
     working,
@@ -23,6 +23,16 @@ from gpi_hammerstein.cli.output import (
 from gpi_hammerstein.cli.residual import name_pictures, tests_table, write_residual_pictures
 from gpi_hammerstein.cli.simulate import ModelFile, Skip, require_match
 from gpi_hammerstein.explanation import failed_in_words
+from gpi_hammerstein.held_out import rule_in_words
+
+OwnRecord = Annotated[
+    bool,
+    typer.Option(
+        "--own-record",
+        help="The record is the one that the model was fitted to: keep its effects that are functions of "
+        "time.",
+    ),
+]
 
 # Above this share of half the sampling rate, sensor noise dominates the residual.
 HIGH_BAND = 0.75
@@ -40,14 +50,18 @@ def validate(
     warmup: options.Warmup = None,
     experiments: options.Experiments = None,
     skip: Skip = 0.0,
-    fit_start: options.FitStart = False,
+    fit_start: options.FitStart = True,
     remove_mean: options.RemoveMean = False,
+    own_record: OwnRecord = False,
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Compute the error of a model on a record, and test its residual for structure.
 
-    Accepts any gpi-model/1 file. Writes validation.json and pictures of the residual to DIR.
+    The error is counted like that on the held-out record of identify and explain: the unknown initial state
+    is fitted, the offset of the model is kept, and effects that are functions of the time of their own record
+    (drift, disturbances) are left out. Accepts any gpi-model/1 file. Writes validation.json and pictures of
+    the residual to DIR.
     """
     model = files.load_model(model_file)
     recording = options.read(
@@ -64,16 +78,24 @@ def validate(
     require_match(model, recording)
     record = recording.record()
     with working("simulating"):
-        error = model.error(record, remove_mean=remove_mean, fit_start=fit_start)
+        left_out = [] if own_record else model.functions_of_time
+        if own_record:
+            error = model.error(record, remove_mean=remove_mean, fit_start=fit_start)
+        else:
+            found = model.on_another_record(record, remove_mean=remove_mean, fit_start=fit_start)
+            error, model = found["error"], found["model"]
         residual = residual_tests(model, record, remove_mean=remove_mean, fit_start=fit_start)
         figures = residual_figures(model, record, fit_start=fit_start)
     name_pictures(residual["tests"], record.output_names, drawn=out is not None)
+    rule = rule_in_words(fit_start=fit_start, remove_mean=remove_mean, left_out=left_out)
     result: dict[str, Any] = {
         "schema": "gpi-validation/1",
         "model": str(model_file),
         "record": describe_record(recording, records),
         "mean_removed": remove_mean,
         "start_fitted": fit_start,
+        "left_out": left_out,
+        "rule": rule,
         "skipped_s": skip,
         "error": error,
         "residual": residual,
@@ -94,7 +116,7 @@ def validate(
     screen = console()
     for note in recording.notes:
         screen.print(f"[yellow]note[/] {escape(note)}")
-    title = "Simulation error" + mean_and_start(remove_mean, fit_start)
+    title = f"Simulation error ({rule})"
     screen.print(error_table({"record": error}, common_unit(record), title))
     screen.print(tests_table(residual["tests"]))
     for sentence in failed_in_words(residual["tests"]):

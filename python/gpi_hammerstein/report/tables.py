@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from gpi_hammerstein._native import Explanation, Model, effect_names
-from gpi_hammerstein.plot.style import BAND
+from gpi_hammerstein.held_out import rule_of
 from gpi_hammerstein.stage import natural
+from gpi_hammerstein.uncertain import NOT_DETERMINED, OF_SIZE, p_value_in_words, spread
 
 Row = Sequence[str]
 
@@ -44,7 +45,7 @@ def errors(found: Explanation, unit: str) -> str:
                     over,
                 ]
             )
-    return table(head, rows, range(1, 6))
+    return table(head, rows, range(1, 6)) + f"<p>Held out: {escape(rule_of(found))}.</p>"
 
 
 def effects(found: Explanation) -> str:
@@ -58,8 +59,8 @@ def effects(found: Explanation) -> str:
         first = [name, "one more" if name in shown else names[name]]
         shown.add(name)
         for row in step["parameters"]:
-            spread = f"± {BAND * row['std']:.2g}" if row["std"] else ""
-            rows.append([*first, row["name"], f"{row['value']:.5g}", spread, row["unit"]])
+            known = [f"{row['value']:.5g}", spread(row)] if row["determined"] else [NOT_DETERMINED, ""]
+            rows.append([*first, row["name"], *known, row["unit"]])
             first = ["", ""]
     if not rows:
         return "<p>No effect was added.</p>"
@@ -81,14 +82,15 @@ def tests(found: Explanation) -> str:
             test["name"],
             f"{test['statistic']:.3g}",
             f"{test['threshold']:.3g}",
-            f"{test['p_value']:.2g}",
+            p_value_in_words(test),
             "yes" if test["passed"] else "no",
             "" if test["passed"] else test["points_to"],
         ]
         for test in found.tests
     ]
     head = ["output", "test", "statistic", "threshold", "p-value", "passed", "points to"]
-    return table(head, rows, (2, 3, 4))
+    note = f"<p>{escape(OF_SIZE)}</p>" if any(test["p_value"] is None for test in found.tests) else ""
+    return table(head, rows, (2, 3, 4)) + note
 
 
 def poles(model: Model) -> str:

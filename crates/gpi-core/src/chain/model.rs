@@ -24,7 +24,7 @@ use crate::{Channel, Error, Matrix};
 use nalgebra::DVector;
 
 impl Model {
-    /// The same model with effects, which stand in their places of the chain.
+    /// The same model with effects, which stand in their places of the chain, without [`Model::estimates`].
     ///
     /// ```
     /// use gpi_core::effects::AmplifierSlew;
@@ -47,6 +47,8 @@ impl Model {
     /// An effect on a channel that the model does not have, or of another number of states.
     pub fn with_effects(mut self, effects: Vec<Effect>) -> Result<Self, Error> {
         self.effects = effects;
+        // they belong to the model with its own effects
+        self.estimates = None;
         self.validate_effects()?;
         Ok(self)
     }
@@ -55,6 +57,29 @@ impl Model {
     /// this order; the places themselves have a fixed order.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
+    }
+
+    /// Rejects covariates that lack a measured column which an effect is made of; `names` are those of the columns that
+    /// are there, in their order.
+    ///
+    /// # Errors
+    /// The effect and the missing column.
+    pub fn require_covariates(&self, names: &[&str]) -> Result<(), Error> {
+        for effect in &self.effects {
+            let Some((place, needed)) = effect.place().added().and_then(|own| own.column()) else {
+                continue;
+            };
+            let found = names.get(place).copied();
+            if found.is_none_or(|found| !found.is_empty() && found != needed) {
+                let requirement = format!(
+                    "the effect `{}` of the model needs the measured column `{needed}` as column {place}",
+                    effect.name()
+                );
+                let value = found.map_or_else(|| format!("{} columns", names.len()), str::to_owned);
+                return Err(Error::parameter("covariates", value, requirement));
+            }
+        }
+        Ok(())
     }
 
     /// What an engineer would call an effect's parameters, with the units of this model's channels: those of the

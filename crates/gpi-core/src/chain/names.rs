@@ -8,6 +8,7 @@
 use super::point::Point;
 use super::table::{Group, Table};
 use crate::Record;
+use crate::effects::Units;
 
 impl Table {
     /// A name for every unknown, such as `u.weights[3]`. Play weights, deadzone weights, thresholds and half-widths
@@ -17,6 +18,43 @@ impl Table {
             range.clone().map(move |i| name(group, i - range.start, point, record))
         };
         self.rows().flat_map(named).collect()
+    }
+}
+
+impl Table {
+    /// The unit of every unknown, empty for a pure number or where it is unknown, and whether zero means absence.
+    pub(crate) fn described(&self, point: &Point, record: &Record) -> Vec<(String, bool)> {
+        let of = |(group, range): (Group, std::ops::Range<usize>)| {
+            range.clone().map(move |i| described(group, i - range.start, point, record))
+        };
+        self.rows().flat_map(of).collect()
+    }
+}
+
+/// The envelope and the plays are in the input's unit; the play weights bring them to that of the only output. G is scaled
+/// to unit DC gain.
+fn described(group: Group, place: usize, point: &Point, record: &Record) -> (String, bool) {
+    let u = |input: usize| record.inputs()[input].unit.clone();
+    let y = |output: usize| record.outputs()[output].unit.clone();
+    let outputs = record.outputs().len();
+    match group {
+        Group::Weights { input } if outputs == 1 => (Units::ratio(&y(0), &u(input)), true),
+        Group::HalfWidths { input } | Group::Thresholds { input } => (u(input), false),
+        Group::Offsets { experiment } => {
+            let knots = point.offsets[experiment].nrows();
+            (y(place / knots), false)
+        }
+        Group::Weights { .. }
+        | Group::Slopes { .. }
+        | Group::Numerator { .. }
+        | Group::ParallelNumerator { .. }
+        | Group::Feedthrough { .. } => (String::new(), true),
+        Group::Denominator { .. }
+        | Group::ParallelDenominator { .. }
+        | Group::Observer { .. }
+        | Group::Effect { .. }
+        | Group::Plays { .. }
+        | Group::State { .. } => (String::new(), false),
     }
 }
 

@@ -127,6 +127,19 @@ impl Table {
         found.map_or(0..0, |(_, range)| range.clone())
     }
 
+    /// The unknowns that the output of an experiment depends on, ascending: all but the offsets and initial states of
+    /// other experiments.
+    pub(crate) fn of_experiment(&self, index: usize) -> Vec<usize> {
+        let own = self.rows.iter().filter(|(group, _)| {
+            let (Offsets { experiment } | Plays { experiment, .. } | State { experiment }) = *group
+            else {
+                return true;
+            };
+            experiment == index
+        });
+        own.flat_map(|(_, range)| range.clone()).collect()
+    }
+
     /// The group of an unknown, and the unknown's place within it.
     pub(crate) fn at(&self, unknown: usize) -> Option<(Group, usize)> {
         let found = self.rows.iter().find(|(_, range)| range.contains(&unknown));

@@ -60,7 +60,7 @@ impl Block for Backlash {
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
-        vec![Quantity::new("gap", units.output, 2.0 * self.half_width)]
+        vec![Quantity::strength("gap", units.output, 2.0 * self.half_width)]
     }
 }
 

@@ -125,7 +125,7 @@ impl Block for Covariate {
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
         let unit = Units::ratio(units.output, &self.label);
-        let gain = Quantity::new(format!("gain of {}", self.label), unit, self.gain);
+        let gain = Quantity::strength(format!("gain of {}", self.label), unit, self.gain);
         let mut quantities = vec![gain];
         if self.time_constant > 0.0 {
             quantities.push(Quantity::new("time_constant", "s", self.time_constant));
@@ -145,6 +145,10 @@ impl Added for Covariate {
 
     fn set_moves_stage(&mut self, moves_stage: bool) {
         self.moves_stage = moves_stage;
+    }
+
+    fn column(&self) -> Option<(usize, &str)> {
+        Some((self.column, &self.label))
     }
 
     /// The column behind the lag.

@@ -105,7 +105,7 @@ impl Block for Creep {
         let mut quantities = Vec::new();
         for (i, (&time, &gain)) in self.time_constants.iter().zip(&self.gains).enumerate() {
             quantities.push(Quantity::new(format!("time_constant[{i}]"), "s", time));
-            quantities.push(Quantity::new(format!("gain[{i}]"), "", gain));
+            quantities.push(Quantity::strength(format!("gain[{i}]"), "", gain));
         }
         quantities
     }

@@ -55,7 +55,7 @@ impl Block for Delay {
     }
 
     fn quantities(&self, _: Units) -> Vec<Quantity> {
-        vec![Quantity::new("delay", "samples", self.samples)]
+        vec![Quantity::strength("delay", "samples", self.samples)]
     }
 }
 

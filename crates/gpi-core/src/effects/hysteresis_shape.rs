@@ -120,7 +120,7 @@ impl Block for HysteresisShape {
         let name =
             |place: usize| format!("density[{}][{}]", 1 + place / self.widths, place % self.widths);
         let values = self.coefficients.iter().enumerate();
-        values.map(|(place, &value)| Quantity::new(name(place), "", value)).collect()
+        values.map(|(place, &value)| Quantity::strength(name(place), "", value)).collect()
     }
 
     fn flaw(&self) -> Option<String> {

@@ -78,7 +78,7 @@ impl Block for LinearDynamics {
         let [a1, a2] = self.denominator[..] else { return Vec::new() };
         let discriminant = 0.25 * a1 * a1 - a2;
         let gain = self.numerator.iter().sum::<f64>() / (1.0 + a1 + a2);
-        let gain = Quantity::new("static_gain", Units::ratio(units.output, units.input), gain);
+        let gain = Quantity::strength("static_gain", Units::ratio(units.output, units.input), gain);
         let time = |pole: f64| -1.0 / (self.rate * pole.abs().max(f64::MIN_POSITIVE).ln());
         if discriminant >= 0.0 {
             let root = discriminant.sqrt();

@@ -59,7 +59,7 @@ impl Block for OutputNonlinearity {
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
         let term = |(i, c): (usize, &f64)| {
-            Quantity::new(format!("curve[{}]", i + 2), units.output, c * self.scale)
+            Quantity::strength(format!("curve[{}]", i + 2), units.output, c * self.scale)
         };
         self.coefficients.iter().enumerate().map(term).collect()
     }

@@ -137,7 +137,7 @@ impl Block for PeriodicDisturbance {
     fn quantities(&self, units: Units) -> Vec<Quantity> {
         vec![
             Quantity::new("frequency", "Hz", self.frequency),
-            Quantity::new("amplitude", units.output, self.cosine.hypot(self.sine)),
+            Quantity::strength("amplitude", units.output, self.cosine.hypot(self.sine)),
             Quantity::new("phase", "rad", (-self.sine).atan2(self.cosine)),
         ]
     }

@@ -9,11 +9,18 @@ pub struct Quantity {
     pub unit: String,
     /// Its value.
     pub value: f64,
+    /// Whether zero means that what it describes is absent: gains, coefficients, amplitudes, sizes.
+    pub zero_is_absence: bool,
 }
 
 impl Quantity {
     pub(crate) fn new(name: impl Into<String>, unit: impl Into<String>, value: f64) -> Self {
-        Self { name: name.into(), unit: unit.into(), value }
+        Self { name: name.into(), unit: unit.into(), value, zero_is_absence: false }
+    }
+
+    /// A number of which zero means absence.
+    pub(crate) fn strength(name: impl Into<String>, unit: impl Into<String>, value: f64) -> Self {
+        Self { zero_is_absence: true, ..Self::new(name, unit, value) }
     }
 }
 

@@ -128,8 +128,8 @@ impl Block for RateDependence {
             if units.input.is_empty() { "s".to_owned() } else { format!("s/{}", units.input) };
         let per_second = if units.input.is_empty() { "1" } else { units.input };
         let mut quantities = vec![
-            Quantity::new("relative_growth", inverse, self.relative),
-            Quantity::new("absolute_growth", "s", self.absolute),
+            Quantity::strength("relative_growth", inverse, self.relative),
+            Quantity::strength("absolute_growth", "s", self.absolute),
         ];
         if let Some(law) = self.law {
             quantities.push(Quantity::new("exponent", "", law.exponent));

@@ -203,19 +203,22 @@ impl Block for Stiffness {
     fn quantities(&self, _: Units) -> Vec<Quantity> {
         let mut found = Vec::new();
         for (q, inner) in self.loops.iter().enumerate() {
-            let mut list = |what: &str, values: &[f64]| {
+            let mut list = |what: &str, values: &[f64], zero_is_absence: bool| {
                 let named = values.iter().enumerate();
-                let quantity = |(i, &value)| Quantity::new(format!("{what}[{q}][{i}]"), "", value);
+                let quantity = |(i, &value)| {
+                    let name = format!("{what}[{q}][{i}]");
+                    Quantity { zero_is_absence, ..Quantity::new(name, "", value) }
+                };
                 found.extend(named.map(quantity));
             };
-            list("drive", &inner.drives);
+            list("drive", &inner.drives, true);
             if let Sees::Mixture { states, inputs } = &inner.sees {
-                list("seen_state", states);
-                list("seen_input", inputs);
+                list("seen_state", states, false);
+                list("seen_input", inputs, false);
             }
             if let Law::Stops { half_widths, weights } = &inner.law {
-                list("half_width", half_widths);
-                list("weight", weights);
+                list("half_width", half_widths, false);
+                list("weight", weights, true);
             }
         }
         found

@@ -8,7 +8,7 @@ use super::state::{Addition, Rejected, SearchState};
 use super::verdict::{self, NextExperiment, Verdict};
 use crate::chain::point::Point;
 use crate::effects::Effect;
-use crate::identify::residuals_from_fitted_start;
+use crate::identify::on_another_record;
 use crate::identify::{Parameter, Refinement};
 use crate::{Error, Matrix, Model, Record, SimulationError};
 use std::ops::Range;
@@ -107,7 +107,9 @@ pub(super) fn summarise(
     let errors = |record: &Record, model: &Model, residuals: &[Matrix]| -> Result<Errors, Error> {
         let train = SimulationError::of(record, residuals, false);
         let test = match holdout {
-            Some(other) => on_another(model, other)?,
+            Some(other) => {
+                on_another_record(model, other, true, &mut |_, _| true)?.error(other, false)
+            }
             None => SimulationError::of(&state.setup.test, residuals, false),
         };
         Ok(Errors { train, holdout: test })
@@ -168,14 +170,6 @@ pub(super) fn summarise(
     })
 }
 
-/// The error on another experiment, without effects that the input does not drive: they differ there.
-fn on_another(model: &Model, record: &Record) -> Result<SimulationError, Error> {
-    let driven = model.effects().iter().filter(|effect| effect.entry().driven).cloned();
-    let model = model.clone().with_effects(driven.collect())?;
-    let residuals = residuals_from_fitted_start(&model, record, &mut |_, _| true)?;
-    Ok(SimulationError::of(record, &residuals, false))
-}
-
 fn declared(before: &Errors) -> Step {
     Step {
         effect: None,
@@ -233,11 +227,13 @@ fn describe(
         };
         let (effect, deviations) = all.remove(place);
         for (i, quantity) in model.quantities(&effect).into_iter().enumerate() {
-            step.units.push(quantity.unit);
+            step.units.push(quantity.unit.clone());
             step.parameters.push(Parameter {
                 name: quantity.name,
                 value: quantity.value,
                 deviation: deviations.get(i).copied().unwrap_or(0.0),
+                unit: quantity.unit,
+                zero_is_absence: quantity.zero_is_absence,
             });
         }
     }

@@ -48,7 +48,7 @@ use explanation::summarise;
 pub use explanation::{Errors, Explanation, Step};
 pub use moved_resonance::Resonance;
 use policy::{FitPolicy, GridPolicy, SearchPolicy};
-pub use residual::{ResidualOptions, ResidualTest, residual_tests};
+pub use residual::{ResidualOptions, ResidualTest, Significance, residual_tests};
 use setup::SearchSetup;
 pub use state::Rejected;
 use state::SearchState;
@@ -139,7 +139,9 @@ pub fn explain(
         None
     };
     let found = summarise(record, holdout, &base, state, refinement, interrupted)?;
-    Ok(Explanation { moved_resonance, ..found })
+    let estimates = found.refinement.estimates(&found.model)?;
+    let model = found.model.clone().with_estimates(estimates);
+    Ok(Explanation { moved_resonance, model, ..found })
 }
 
 /// Whether a search ended because it was to stop: what it has found so far stands.

@@ -9,7 +9,7 @@ use super::revision::{
 };
 use super::setup::SearchSetup;
 use super::state::{Addition, Rejected, SearchState, Trial};
-use super::trial::{trial, trials};
+use super::trial::{trial, trials as trials_of};
 use crate::Error;
 use crate::effects::{Entry, FreeOrder, Signature, Stage};
 use crate::fit::minimize::Fitted;
@@ -81,7 +81,10 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
         return Ok(false);
     }
     best.truncate(policy.fitted);
-    let mut trials = trials(state, best, progress)?;
+    let (mut trials, mut failed) = (Vec::new(), Vec::new());
+    for tried in trials_of(state, best, progress)? {
+        tried.map_or_else(|one| failed.push(one), |trial| trials.push(trial));
+    }
     // by what is explained beyond the significance threshold
     trials.sort_by(|a, b| (b.deviance - b.threshold).total_cmp(&(a.deviance - a.threshold)));
     let before = state.held_out(&state.point)?;
@@ -107,7 +110,9 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
         let refusal = refusal(&evidences[place], taken.map(|taken| &evidences[taken]), judgement);
         rejected(state.setup, &trials[place], refusal, taken.map(|taken| &trials[taken]))
     };
-    let others = (0..trials.len()).filter(|&place| Some(place) != taken).map(reject).collect();
+    let others = (0..trials.len()).filter(|&place| Some(place) != taken).map(reject);
+    let others = others.chain(failed.into_iter().map(|one| failure(state.setup, one, &before)));
+    let others: Vec<Rejected> = others.collect();
     let Some(taken) = taken else {
         state.last = others;
         let Some(better) = better else { return Ok(false) };
@@ -148,6 +153,16 @@ fn evidence<'a>(
         is_slow: trial.entry.signature == Signature::SlowInTime,
         is_added: trial.entry.stage == Stage::Added,
         doubt: None,
+    }
+}
+
+/// A candidate whose fit failed.
+fn failure(setup: &SearchSetup, (entry, error): (&Entry, Error), before: &[f64]) -> Rejected {
+    Rejected {
+        effect: entry.name,
+        holdout_rms: setup.holdout_rms(before),
+        why: format!("could not be fitted to this record ({error})"),
+        confounded_with: Vec::new(),
     }
 }
 

@@ -34,22 +34,31 @@ use crate::fit::joint::Refined;
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::optimize::Status;
 
-/// Fits candidates; where fits take long, only those that may come near the best so far.
+/// What a candidate became, or why its fit failed.
+pub(super) type Tried = Result<Trial, (&'static Entry, Error)>;
+
+/// Fits candidates; where fits take long, only those that may come near the best so far. The failure of one does not
+/// concern the others.
 pub(super) fn trials(
     state: &SearchState,
     ranked: Vec<Ranked>,
     progress: Progress,
-) -> Result<Vec<Trial>, Error> {
+) -> Result<Vec<Tried>, Error> {
+    let tried = |one: Ranked, progress: Progress| -> Result<Tried, Error> {
+        let entry = one.entry;
+        let trial = Error::unless_interrupted(trial(state, one, progress))?;
+        Ok(trial.map_err(|error| (entry, error)))
+    };
     if !state.setup.is_long(&state.point) {
-        let work = |one, progress: Progress| trial(state, one, progress);
-        return concurrently(ranked, progress, work);
+        return concurrently(ranked, progress, tried);
     }
-    let mut trials: Vec<Trial> = Vec::new();
+    let mut trials: Vec<Tried> = Vec::new();
     for one in ranked {
-        let best = trials.iter().map(|trial| trial.deviance).fold(0.0, f64::max);
+        let deviances = trials.iter().flatten().map(|trial| trial.deviance);
+        let best = deviances.fold(0.0, f64::max);
         let own = promised(state.prepared.values(), one.score.gain);
         if own >= state.setup.policy.ranking.near * best {
-            trials.push(trial(state, one, progress)?);
+            trials.push(tried(one, progress)?);
         }
     }
     Ok(trials)

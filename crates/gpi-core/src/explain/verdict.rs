@@ -49,7 +49,7 @@ pub struct NextExperiment {
 /// use gpi_core::explain::{ResidualTest, structured};
 /// let name = "whiteness";
 /// let test = ResidualTest {
-///     name, output: 0, statistic: 90.0, threshold: 50.0, p_value: 1e-8, points_to: "memory".to_owned(),
+///     name, output: 0, statistic: 90.0, threshold: 50.0, significance: None, points_to: "memory".to_owned(),
 /// };
 /// assert!(structured(&[], &[test.clone()]));
 /// assert!(!structured(&["coloured-noise"], &[test]));

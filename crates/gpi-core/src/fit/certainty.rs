@@ -15,7 +15,7 @@
 
 use super::gather::gather;
 use super::minimize::{FitOptions, Fitted};
-use super::problem::{Estimation, scored};
+use super::problem::{Estimation, only, scored};
 use super::representatives::{representatives, streamed};
 use crate::chain::point::Point;
 use crate::chain::stream::Stream;
@@ -69,15 +69,18 @@ fn score_gram(
     let few = representatives(point, record, table.len);
     for (index, experiment, memory) in streamed(few.as_ref(), record) {
         let stream = Stream::new(point, table, freedom.derivatives, experiment, index)?;
+        let own = table.of_experiment(index);
+        let mut part = NormalEquations::zeros(own.len(), 1);
         let mut past: Vec<Matrix> =
-            noise.coefficients.iter().map(|a| Matrix::zeros(table.len, a.len())).collect();
+            noise.coefficients.iter().map(|a| Matrix::zeros(own.len(), a.len())).collect();
         gather(stream.with_memory(memory), check, |rows| {
             let mut filtered = Vec::new();
-            for (output, regressor) in rows.regressors.iter().enumerate() {
+            for (output, regressor) in rows.regressors.into_iter().enumerate() {
+                let regressor = only(regressor, &own);
                 let (filter, past) = (&noise.coefficients[output], &mut past[output]);
                 let order = filter.len();
                 let count = regressor.ncols();
-                let mut extended = Matrix::zeros(table.len, order + count);
+                let mut extended = Matrix::zeros(own.len(), order + count);
                 extended.columns_mut(0, order).copy_from(past);
                 for k in 0..count {
                     let mut row = regressor.column(k).into_owned();
@@ -96,9 +99,10 @@ fn score_gram(
                 for (output, part) in filtered.iter().enumerate().skip(1) {
                     sum += part * root[(output, mixed)];
                 }
-                equations.add(&sum, &none);
+                part.add(&sum, &none);
             }
         })?;
+        equations.add_part(&part, &own);
     }
     if let Some(few) = few {
         few.extend(&mut equations.gram, table, record);

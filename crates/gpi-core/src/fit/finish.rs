@@ -89,11 +89,14 @@ impl Refined {
         let residuals = point.residuals(record)?;
         let estimated = point.bounds(&table, record, self.options.freedom).estimated();
         let (names, values_of) = names_and_values(&point, &table, prepared);
+        let described = table.described(&point, record);
         let deviations = uncertainty.deviations();
         let parameter = |&i: &usize| Parameter {
             name: names[i].clone(),
             value: values_of[i],
             deviation: deviations[i],
+            unit: described[i].0.clone(),
+            zero_is_absence: described[i].1,
         };
         let covariance = Matrix::from_fn(estimated.len(), estimated.len(), |i, j| {
             uncertainty.covariance[(estimated[i], estimated[j])]

@@ -13,8 +13,8 @@ use crate::{Error, Matrix, Model, Record};
 /// unknown initial state is fitted to the record and the model is kept.
 ///
 /// Only the initial state is estimated: the place of every play between z(0) - r and z(0) + r, and the state of G. An
-/// experiment that begins at rest, or has a warm-up, is simulated as it is. MATLAB's `compare` estimates the initial
-/// state in the same way.
+/// experiment that begins at rest is simulated as it is. A warm-up is not scored, but drives the model from the state that
+/// fits the samples behind it best. MATLAB's `compare` estimates the initial state in the same way.
 ///
 /// # Errors
 /// Channels or rates that differ, [`Error::Interrupted`] when `progress` returned false.
@@ -24,6 +24,7 @@ pub fn residuals_from_fitted_start(
     progress: Progress,
 ) -> Result<Vec<Matrix>, Error> {
     require_match(model, record)?;
+    model.require_covariates_of(record)?;
     let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
     let prepared = Prepared::scoring_all(record, channels)?;
     let mut point = prepared.point_of(model)?;

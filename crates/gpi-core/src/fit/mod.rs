@@ -12,6 +12,7 @@
 //! H and d are all that a step, the projections of `explain` and, with the residual's autocorrelation, the covariance
 //! need; the rows psi are streamed and never stored.
 
+mod another_record;
 mod bridge;
 mod certainty;
 pub(crate) mod dense;
@@ -33,6 +34,7 @@ mod sensitivities;
 mod settings;
 
 pub use crate::optimize::Status;
+pub use another_record::{OnAnotherRecord, functions_of_time, on_another_record};
 pub use grid::Grid;
 pub use hysteresis::{HysteresisFit, fit_hysteresis};
 pub use initial_state::residuals_from_fitted_start;

@@ -10,6 +10,9 @@
 //! gram    = sum_k,o w_o(k) psi_o(k) psi_o(k)'          (unknowns, unknowns), half the Gauss-Newton Hessian
 //! ```
 //!
+//! The offset and the initial state of an experiment move its own output only. The products of an experiment are therefore
+//! those of the shared unknowns and its own ones, and the Gram matrix of all unknowns has the shape of an arrow.
+//!
 //! psi is never stored: its rows are streamed through the chain in blocks, each block is added to `gram` and
 //! `descent`, and the memory needed does not grow with N times unknowns. Where the Gram matrix of a whole record would
 //! take long, it comes from a part of it (see [`representatives`]) and the gradient from an adjoint pass, which costs a
@@ -65,9 +68,12 @@ impl LeastSquares for Estimation<'_> {
             check()?;
             let wanted = self.freedom.derivatives;
             let stream = Stream::new(point, &self.table, wanted, experiment, index)?;
+            let own = self.table.of_experiment(index);
+            let mut part = NormalEquations::zeros(own.len(), 1);
             gather(stream.with_memory(memory), check, |rows| {
-                cost += add(&mut equations, rows, self.loss);
+                cost += add(&mut part, rows, &own, self.loss);
             })?;
+            equations.add_part(&part, &own);
         }
         let NormalEquations { mut gram, rhs, .. } = equations;
         let Some(few) = few else {
@@ -130,10 +136,11 @@ pub(crate) fn residual_rms(residuals: &[Matrix], record: &Record) -> Vec<f64> {
     (0..record.outputs().len()).map(rms).collect()
 }
 
-/// Adds a block of rows to the equations; returns its cost.
-fn add(equations: &mut NormalEquations, rows: Rows, loss: &Loss) -> f64 {
+/// Adds a block of rows to the equations of the unknowns `own`; returns its cost.
+fn add(equations: &mut NormalEquations, rows: Rows, own: &[usize], loss: &Loss) -> f64 {
     let mut cost = 0.0;
-    for (output, mut regressor) in rows.regressors.into_iter().enumerate() {
+    for (output, regressor) in rows.regressors.into_iter().enumerate() {
+        let mut regressor = only(regressor, own);
         let mut target = rows.residuals.row(output).into_owned();
         for (mut row, value) in regressor.column_iter_mut().zip(target.iter_mut()) {
             let (weight, own) = loss.of(output, *value);
@@ -145,6 +152,12 @@ fn add(equations: &mut NormalEquations, rows: Rows, loss: &Loss) -> f64 {
         equations.add(&regressor, &target);
     }
     cost
+}
+
+/// The rows of some unknowns, all that are not zero: for n experiments with unknown initial states of their own, the
+/// products of all unknowns take up to n^2 times as long as those of each experiment's own.
+pub(super) fn only(regressor: Matrix, own: &[usize]) -> Matrix {
+    if own.len() == regressor.nrows() { regressor } else { regressor.select_rows(own) }
 }
 
 #[cfg(test)]

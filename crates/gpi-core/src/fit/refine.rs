@@ -68,5 +68,7 @@ pub fn refine(
     }
     let refined = joint(point, &prepared, options, f64::INFINITY, false, progress)?;
     let refinement = refined.finish(&prepared, progress)?;
-    Ok((refinement.bands.point.to_model(record, &prepared.record, &prepared.means)?, refinement))
+    let model = refinement.bands.point.to_model(record, &prepared.record, &prepared.means)?;
+    let estimates = refinement.estimates(&model)?;
+    Ok((model.with_estimates(estimates), refinement))
 }

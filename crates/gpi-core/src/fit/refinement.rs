@@ -1,8 +1,8 @@
 //! What is asked of a refinement, and what it answers.
 
-use crate::Matrix;
 use crate::optimize::Status;
-use crate::uncertainty::{Bands, NoiseFloor};
+use crate::uncertainty::{Bands, NoiseFloor, NoiseMethod};
+use crate::{EffectEstimates, Error, Estimate, EstimatedNoise, Estimates, Matrix, Model};
 
 /// What a refinement may move besides weights, deadzone weights, dynamics and offset, and how residuals
 /// count.
@@ -29,6 +29,18 @@ pub struct Parameter {
     /// Its standard deviation; 0 for a weight that is held at zero by its bound, NaN where the data do
     /// not determine it.
     pub deviation: f64,
+    /// Its unit, empty for a pure number or where it is unknown.
+    pub unit: String,
+    /// Whether zero means that what it describes is absent: weights, coefficients of numerators.
+    pub zero_is_absence: bool,
+}
+
+impl Parameter {
+    /// The parameter as a model file keeps it, with whether it is determined.
+    pub fn estimate(&self) -> Estimate {
+        let Self { name, value, deviation, unit, zero_is_absence } = self;
+        Estimate::new(name, unit, *value, *deviation, *zero_is_absence)
+    }
 }
 
 /// How a model was refined, and the uncertainty of its parameters.
@@ -57,4 +69,44 @@ pub struct Refinement {
     pub robust: bool,
     /// Standard deviations of whatever follows from the parameters.
     pub bands: Bands,
+}
+
+impl Refinement {
+    /// What the file of the refined model keeps: see [`Estimates`].
+    ///
+    /// # Errors
+    /// The covariance's decomposition does not converge.
+    pub fn estimates(&self, model: &Model) -> Result<Estimates, Error> {
+        let deviations = self.bands.effect_deviations()?;
+        let effect = |(place, effect): (usize, &crate::effects::Effect)| {
+            // what only describes the residual is not estimated in the fit
+            let own = deviations.get(place).filter(|_| effect.block().is_some());
+            let deviation = |i: usize| own.and_then(|all| all.get(i)).copied().unwrap_or(0.0);
+            let quantities = model.quantities(effect).into_iter().enumerate();
+            let parameters = quantities.map(|(i, own)| {
+                Estimate::new(own.name, own.unit, own.value, deviation(i), own.zero_is_absence)
+            });
+            EffectEstimates { name: effect.name().to_owned(), parameters: parameters.collect() }
+        };
+        let (period, samples) = match self.noise_floor.method {
+            NoiseMethod::RepeatedPeriods { period } => (Some(period), None),
+            NoiseMethod::Rests { samples } => (None, Some(samples)),
+            NoiseMethod::HighFrequencyResidual => (None, None),
+        };
+        Ok(Estimates {
+            status: self.status.name().to_owned(),
+            parameters: self.parameters.iter().map(Parameter::estimate).collect(),
+            effects: model.effects().iter().enumerate().map(effect).collect(),
+            undetermined: self.undetermined.clone(),
+            residual_rms: self.residual_rms.clone(),
+            noise_floor: EstimatedNoise {
+                rms: self.noise_floor.rms.clone(),
+                how: self.noise_floor.method.name().to_owned(),
+                period,
+                samples,
+            },
+            outliers: self.outliers,
+            robust: self.robust,
+        })
+    }
 }

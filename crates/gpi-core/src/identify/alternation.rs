@@ -58,12 +58,19 @@ pub(crate) fn seed(
     for round in 0..policy.rounds {
         report(progress, "rounds", round as f64 / policy.rounds as f64)?;
         if round > 0 {
-            current = dynamics_of(&prepared.driven(&point)?, taps, order, settings, progress)?;
-            point.replace_dynamics(current.sections()?);
+            let driven = prepared.driven(&point);
+            let found = driven
+                .and_then(|driven| dynamics_of(&driven, taps, order, settings, progress))
+                .and_then(|found| Ok((found.sections()?, found)));
+            // v of this round allows no realization: the best round so far stands
+            let Ok((sections, found)) = Error::unless_interrupted(found)? else { break };
+            point.replace_dynamics(sections);
+            current = found;
         }
         rescale(&mut point);
         prepared.place(&mut point, half_widths)?;
-        let fitted = fit(point, &prepared.record, &options, "hysteresis", progress)?;
+        let fitted = fit(point.clone(), &prepared.record, &options, "hysteresis", progress);
+        let Ok(fitted) = Error::unless_interrupted(fitted)? else { break };
         point = fitted.point;
         let rms = (fitted.linearization.cost / prepared.values()).sqrt();
         rounds.push(Round { rms, order: current.refit.system.order(), taps: taps.count });
@@ -109,7 +116,8 @@ pub(crate) fn dynamics_of(
     let needed = (settings.taps.decayed.ln() / radius.ln()) as usize;
     if needed > taps.count + taps.count / settings.taps.tolerance && taps.count < taps.largest {
         taps.count = needed.min(taps.largest);
-        return realization::estimate(record, taps.count, settings, order, &mut check);
+        let longer = realization::estimate(record, taps.count, settings, order, &mut check);
+        return Ok(Error::unless_interrupted(longer)?.unwrap_or(found));
     }
     Ok(found)
 }

@@ -34,6 +34,9 @@ pub(super) struct Comparison<'a> {
     candidates: Vec<Candidate>,
     /// What each candidate became, and the samples of white noise that a parameter takes from its residual.
     refined: Vec<(Refined, f64)>,
+    /// Why candidates were dropped whose computation failed, and whether the last one was.
+    failures: Vec<Error>,
+    has_failed: bool,
 }
 
 impl<'a> Comparison<'a> {
@@ -43,15 +46,51 @@ impl<'a> Comparison<'a> {
         options: RefineOptions,
         fast: bool,
     ) -> Self {
-        Self { prepared, policy, options, fast, candidates: Vec::new(), refined: Vec::new() }
+        Self {
+            prepared,
+            policy,
+            options,
+            fast,
+            candidates: Vec::new(),
+            refined: Vec::new(),
+            failures: Vec::new(),
+            has_failed: false,
+        }
     }
 
-    /// Refines a point; says whether it is better than all before.
+    /// Refines a point; says whether it is better than all before. A point whose computation fails is dropped.
     pub(super) fn offer(&mut self, point: Point, progress: Progress) -> Result<bool, Error> {
+        self.has_failed = false;
+        let offered = self.refine(point, progress);
+        Ok(Error::unless_interrupted(offered)?.unwrap_or_else(|error| {
+            self.drop_failed(error);
+            false
+        }))
+    }
+
+    /// Drops a candidate because of its error.
+    pub(super) fn drop_failed(&mut self, error: Error) {
+        self.failures.push(error);
+        self.has_failed = true;
+    }
+
+    /// Whether the last candidate was dropped because its computation failed.
+    pub(super) fn has_failed(&self) -> bool {
+        self.has_failed
+    }
+
+    /// The first failure of a candidate.
+    pub(super) fn failure(&self) -> Option<&Error> {
+        self.failures.first()
+    }
+
+    fn refine(&mut self, point: Point, progress: Progress) -> Result<bool, Error> {
         let usable = self.refined.iter().filter(|(refined, _)| self.is_usable(refined));
         let costs = usable.map(|(refined, _)| refined.fitted.linearization.cost);
         let hopeless = self.policy.hopeless * costs.fold(f64::INFINITY, f64::min);
         let refined = joint(point, self.prepared, &self.options, hopeless, self.fast, progress)?;
+        // a model of it must exist
+        refined.fitted.point.dynamics.to_state_space()?;
         let uncertainty = refined.uncertainty(&self.prepared.record, progress)?;
         let parameters = uncertainty.estimated;
         let point = &refined.fitted.point;
@@ -84,13 +123,13 @@ impl<'a> Comparison<'a> {
         }
     }
 
-    /// Whether slow poles rule out all candidates, and G of the best one is flat beyond them.
+    /// Whether slow poles rule out all candidates, and G of the best one is flat beyond them; or none could be computed.
     pub(super) fn shows_nothing_fast(&self) -> bool {
         let StructurePolicy { frequencies, flat, .. } = *self.policy;
         if self.has_usable() {
             return false;
         }
-        let Some(best) = self.closest() else { return false };
+        let Some(best) = self.closest() else { return !self.failures.is_empty() };
         let dynamics = &self.refined[best].0.fitted.point.dynamics;
         // twice the corner of the longest lag that is dynamics
         let lowest = (2.0 / longest_lag(self.prepared.record.rate())).min(1.0);

@@ -18,8 +18,9 @@ mod settings;
 mod structure;
 
 pub use crate::fit::{
-    Grid, HysteresisFit, Parameter, RefineOptions, Refinement, Sensitivities, Status,
-    fit_hysteresis, refine, residuals_from_fitted_start, sensitivities,
+    Grid, HysteresisFit, OnAnotherRecord, Parameter, RefineOptions, Refinement, Sensitivities,
+    Status, fit_hysteresis, functions_of_time, on_another_record, refine,
+    residuals_from_fitted_start, sensitivities,
 };
 pub use crate::progress::Progress;
 pub use crate::uncertainty::{Bands, NoiseFloor, NoiseMethod, PoleDeviations, ResponseDeviation};

@@ -98,7 +98,19 @@ pub(crate) fn compare(
         return Err(Error::TooFewSamples { samples: record.scored(), needed, purpose });
     }
     let taps = options.taps.unwrap_or(supported.min(affordable));
-    if options.delay.is_some() || taps <= policy.gain_and_delay {
+    let largest = (policy.unknowns / inputs).min(policy.most).min(supported).min(affordable);
+    let count = options.taps.unwrap_or(largest.min(policy.first));
+    let mut few = Taps { count, largest: options.taps.unwrap_or(largest) };
+    let has_dynamics = options.delay.is_none() && taps > policy.gain_and_delay;
+    let seed = has_dynamics
+        .then(|| alternation::seed(prepared, &grid, &mut few, options.order, settings, progress));
+    let seed = match seed.map(Error::unless_interrupted).transpose()? {
+        Some(Ok(seed)) => Some(seed),
+        // no realization of any order: a gain with a delay is left to try, unless dynamics are asked for
+        Some(Err(error)) if options.order.is_some() || options.taps.is_some() => return Err(error),
+        Some(Err(_)) | None => None,
+    };
+    let Some(seed) = seed else {
         if let Some(order) = options.order {
             let requirement = format!(
                 "the input supports {} taps, which is a gain and a delay; leave the order out",
@@ -119,17 +131,13 @@ pub(crate) fn compare(
         enrich(&mut search, fast, progress)?;
         let stages = (None, Vec::new(), 0, rounds);
         return compared(search, true, stages, supported);
-    }
-    let largest = (policy.unknowns / inputs).min(policy.most).min(supported).min(affordable);
-    let count = options.taps.unwrap_or(largest.min(policy.first));
-    let mut taps = Taps { count, largest: options.taps.unwrap_or(largest) };
-    let seed = alternation::seed(prepared, &grid, &mut taps, options.order, settings, progress)?;
+    };
     let mut search = StructureSearch::new(prepared, &settings.structure, options, fast);
     search.climb(&seed.point, progress)?;
     if options.order.is_none() {
         let mut quiet = |_: &str, _: f64| true;
         let mut dynamics = |driven: &Record, order: usize| {
-            alternation::dynamics_of(driven, &mut taps, Some(order), settings, &mut quiet)?
+            alternation::dynamics_of(driven, &mut few, Some(order), settings, &mut quiet)?
                 .sections()
         };
         search.orders(&mut dynamics, progress)?;
@@ -160,8 +168,12 @@ fn compared(
     stages: (Option<Fir>, Vec<f64>, usize, Vec<Round>),
     supported: usize,
 ) -> Result<Compared, Error> {
+    let failure = search.failure();
     let Some((chosen, refined, candidates)) = search.finish() else {
-        return Err(Error::parameter("half_widths", "none", "at least one structure is tried"));
+        // all candidates failed: the first one's reason is that of the data
+        return Err(failure.unwrap_or_else(|| {
+            Error::parameter("half_widths", "none", "at least one structure is tried")
+        }));
     };
     Ok(Compared { chosen, refined, candidates, quasi_static, stages, supported })
 }
@@ -206,12 +218,11 @@ fn finish(
             dynamics.delay
         ));
     }
+    let point = &refinement.bands.point;
+    let model = point.to_model(prepared.given, &prepared.record, &prepared.means)?;
+    let estimates = refinement.estimates(&model)?;
     Ok(Identification {
-        model: refinement.bands.point.to_model(
-            prepared.given,
-            &prepared.record,
-            &prepared.means,
-        )?,
+        model: model.with_estimates(estimates),
         candidates,
         chosen,
         fir,

@@ -43,6 +43,9 @@ pub(crate) fn estimate(
     let fir = linear::estimate(record, taps, settings.alternation.ridge)?;
     check()?;
     let hankel = Hankel::new(&fir.markov, None)?;
+    if hankel.rank() == 0 && fir.markov[0].amax() == 0.0 {
+        return Err(Error::NoResponse { taps, samples: record.scored() });
+    }
     let orders: Vec<usize> = match order {
         Some(order) => vec![order],
         None => {
@@ -60,14 +63,17 @@ pub(crate) fn estimate(
     };
     for order in orders.into_iter().filter(|&n| order.is_some() || n <= hankel.rank()) {
         check()?;
-        let era = match hankel.realize(order) {
-            Ok(era) => era,
+        let realized = hankel.realize(order).and_then(|era| {
+            let refit = refit(record, era.system.clone())?;
+            Ok((era, refit))
+        });
+        let (era, refit) = match realized {
+            Ok(found) => found,
             Err(error) => {
                 refusal = Some(error);
                 continue;
             }
         };
-        let refit = refit(record, era.system)?;
         singular_values = era.singular_values;
         let is_worth = |(_, best): &(usize, Refit)| order <= small || refit.rms < worth * best.rms;
         if best.as_ref().is_none_or(|best| is_worth(best) && better(era.reflected, &refit, best)) {
@@ -77,7 +83,7 @@ pub(crate) fn estimate(
     match (best, refusal) {
         (Some((reflected, refit)), _) => Ok(Dynamics { singular_values, reflected, refit }),
         (None, Some(error)) => Err(error),
-        (None, None) => Err(Error::parameter("taps", taps, "the estimated response is zero")),
+        (None, None) => Err(Error::NoResponse { taps, samples: record.scored() }),
     }
 }
 

@@ -51,6 +51,11 @@ impl<'a> StructureSearch<'a> {
         self.comparison.shows_nothing_fast()
     }
 
+    /// Why the first candidate was dropped whose computation failed.
+    pub(super) fn failure(&self) -> Option<Error> {
+        self.comparison.failure().cloned()
+    }
+
     /// The best candidate's place and what it became, and all candidates.
     pub(super) fn finish(self) -> Option<(usize, Refined, Vec<Candidate>)> {
         self.comparison.finish()
@@ -73,8 +78,15 @@ impl<'a> StructureSearch<'a> {
     pub(super) fn climb(&mut self, seed: &Point, progress: Progress) -> Result<(), Error> {
         let (mut worse, mut least) = (0, f64::INFINITY);
         for (half_widths, thresholds) in self.ladder() {
-            let point = self.placed(seed, &half_widths, &thresholds, progress)?;
-            self.comparison.offer(point, progress)?;
+            let placed = self.placed(seed, &half_widths, &thresholds, progress);
+            match Error::unless_interrupted(placed)? {
+                Ok(point) => drop(self.comparison.offer(point, progress)?),
+                Err(error) => self.comparison.drop_failed(error),
+            }
+            // fewer plays may work where more did not
+            if self.comparison.has_failed() {
+                continue;
+            }
             let criterion = self.comparison.last_criterion();
             worse = if criterion < least { 0 } else { worse + 1 };
             least = least.min(criterion);
@@ -146,7 +158,9 @@ impl<'a> StructureSearch<'a> {
             dynamics.delay = delay;
             lagged.replace_dynamics(dynamics);
             self.comparison.offer(lagged, progress)?;
-            self.comparison.withdraw_slow(slowest_lag);
+            if !self.comparison.has_failed() {
+                self.comparison.withdraw_slow(slowest_lag);
+            }
         }
         Ok(())
     }
@@ -154,7 +168,7 @@ impl<'a> StructureSearch<'a> {
     /// Tries the best fit of all without the poles that rule it out: a lower order drops the weakest mode
     /// instead, which may be the stage's own resonance.
     pub(super) fn shed(&mut self, progress: Progress) -> Result<(), Error> {
-        if let Some(point) = self.comparison.without_slow_poles()? {
+        if let Ok(Some(point)) = self.comparison.without_slow_poles() {
             self.comparison.offer(point, progress)?;
         }
         Ok(())

@@ -26,6 +26,8 @@ pub(super) struct Explanation {
     pub(super) found: core::Explanation,
     pub(super) record: Py<Record>,
     pub(super) refinement: Py<Refinement>,
+    /// Whether a held-out record was given.
+    pub(super) on_another_record: bool,
 }
 
 #[pymethods]
@@ -53,6 +55,13 @@ impl Explanation {
     #[getter]
     fn record(&self, py: Python<'_>) -> Py<Record> {
         self.record.clone_ref(py)
+    }
+
+    /// Whether the held-out errors are those on another record, by the rule of ``Model.on_another_record``; otherwise they
+    /// are those on blocks of the record itself, which no fit has seen.
+    #[getter]
+    fn on_another_record(&self) -> bool {
+        self.on_another_record
     }
 
     /// Errors of the declared model.
@@ -118,7 +127,8 @@ impl Explanation {
 
     /// Tests of the residual.
     ///
-    /// Rows of ``name``, ``output``, ``statistic``, ``threshold`` and ``p_value`` (pure numbers), ``passed``, ``points_to``.
+    /// Rows of ``name``, ``output``, ``statistic``, ``threshold``, ``p_value`` and ``level`` (pure numbers), ``passed``,
+    /// ``points_to``, as in ``residual_tests``.
     #[getter]
     fn tests<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         rows::tests(py, &self.found.tests, &self.found.model)

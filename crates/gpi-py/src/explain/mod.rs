@@ -94,12 +94,13 @@ fn explain(
     let options = core::ExplainOptions { identify, effects, require: require.unwrap_or_default() };
     let own = record.bind(py).borrow();
     let (measured, holdout) = (&own.record, holdout.map(|other| &other.record));
+    let on_another_record = holdout.is_some();
     let found = interruptible_in_part(py, progress, |report| {
         core::explain(measured, holdout, &options, report)
     })?;
     drop(own);
-    let refinement = Py::new(py, Refinement { refinement: found.refinement.clone() })?;
-    Ok(Explanation { found, record, refinement })
+    let refinement = Py::new(py, Refinement::new(&found.model, found.refinement.clone())?)?;
+    Ok(Explanation { found, record, refinement, on_another_record })
 }
 
 /// Names and descriptions of all effects that ``explain`` knows, in the order of the signal chain.

@@ -36,7 +36,10 @@ use pyo3::types::PyDict;
 /// dict
 ///     ``structured``: whether the residual contains more than noise. Isolated outliers count as noise, and so does
 ///     autocorrelation if the model has the effect ``coloured-noise``. ``tests``: rows of ``name``, ``output``,
-///     ``statistic``, ``threshold`` (pure numbers), ``p_value``, ``passed``, ``points_to``.
+///     ``statistic``, ``threshold`` (pure numbers), ``p_value``, ``level``, ``passed``, ``points_to``. A test passes if
+///     ``statistic <= threshold``, which is the same as ``p_value >= level``. ``p_value`` and ``level`` are None where the
+///     threshold is one of practical size: what the input predicts (``prediction``), the number of ``outliers``, and
+///     ``whiteness`` in long records, where correlations far below any practical size are significant.
 ///
 /// Raises
 /// ------

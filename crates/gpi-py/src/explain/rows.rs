@@ -23,6 +23,7 @@ pub(super) fn step<'py>(py: Python<'py>, step: &core::Step) -> PyResult<Bound<'p
         row.set_item("value", parameter.value)?;
         row.set_item("std", Some(parameter.deviation).filter(|std| std.is_finite()))?;
         row.set_item("unit", unit)?;
+        row.set_item("determined", parameter.estimate().determined)?;
         PyResult::Ok(row)
     });
     row.set_item("parameters", parameters.collect::<PyResult<Vec<_>>>()?)?;
@@ -91,7 +92,8 @@ pub(super) fn tests<'py>(
         row.set_item("output", &model.outputs()[test.output].name)?;
         row.set_item("statistic", test.statistic)?;
         row.set_item("threshold", test.threshold)?;
-        row.set_item("p_value", test.p_value)?;
+        row.set_item("p_value", test.significance.map(|own| own.p_value))?;
+        row.set_item("level", test.significance.map(|own| own.level))?;
         row.set_item("passed", test.passed())?;
         row.set_item("points_to", &test.points_to)?;
         Ok(row)

@@ -97,7 +97,7 @@ fn identify(
     let record = &record.record;
     let found = interruptible(py, progress, |report| core::identify(record, &options, report))?;
     let model = found.model.clone();
-    let refinement = Refinement { refinement: found.refinement.clone() };
+    let refinement = Refinement::new(&found.model, found.refinement.clone())?;
     let refinement = Some(Py::new(py, refinement)?);
     Ok(Model { model, identification: Some(Py::new(py, Identification { found })?), refinement })
 }

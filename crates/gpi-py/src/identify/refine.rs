@@ -71,6 +71,6 @@ pub(super) fn refine(
     let (start, record) = (&model.model, &record.record);
     let (refined, refinement) =
         interruptible(py, progress, |report| core::refine(start, record, &options, report))?;
-    let refinement = Some(Py::new(py, Refinement { refinement })?);
+    let refinement = Some(Py::new(py, Refinement::new(&refined, refinement)?)?);
     Ok(Model { model: refined, identification: None, refinement })
 }

@@ -19,7 +19,7 @@ use crate::plotting::in_notebook;
 use crate::progress::interruptible;
 use crate::record::Record;
 use gpi_core::compensate::CompensateOptions;
-use gpi_core::identify::residuals_from_fitted_start;
+use gpi_core::identify::{functions_of_time, on_another_record, residuals_from_fitted_start};
 use gpi_core::{Matrix, SimulationError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -111,7 +111,9 @@ impl Model {
         self.identification.as_ref().map(|identification| identification.clone_ref(py))
     }
 
-    /// How the model was refined, and the uncertainty of its parameters; None for a model that was loaded.
+    /// How the model was refined, and the uncertainty of its parameters; None for a model without refinement.
+    ///
+    /// A model that was loaded or unpickled has the parts that model files contain, see ``Refinement``.
     #[getter]
     fn refinement(&self, py: Python<'_>) -> Option<Py<Refinement>> {
         self.refinement.as_ref().map(|refinement| refinement.clone_ref(py))
@@ -119,10 +121,39 @@ impl Model {
 
     /// The effects of the model, in the order of the signal chain.
     ///
-    /// Rows of ``name`` and ``parameters`` (rows of ``name``, ``value`` in ``unit``, and ``unit``, empty for a pure number).
+    /// Rows of ``name`` and ``parameters``. These are rows of ``name``, ``value`` and ``std`` in ``unit`` (empty for a pure
+    /// number), and ``determined``, as in ``Refinement.parameters``; ``std`` is None if it is unknown.
     #[getter]
     fn effects<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         effects::rows(py, &self.model)
+    }
+
+    /// Names of the effects that are functions of the time of the record that the model was fitted to.
+    ///
+    /// They say nothing of another record, see ``on_another_record``.
+    #[getter]
+    fn functions_of_time(&self) -> Vec<&'static str> {
+        functions_of_time(&self.model)
+    }
+
+    #[doc = include_str!("../docs/model/on_another_record.txt")]
+    #[pyo3(signature = (record, *, fit_start = true, remove_mean = false))]
+    fn on_another_record<'py>(
+        &self,
+        py: Python<'py>,
+        record: &Record,
+        fit_start: bool,
+        remove_mean: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (model, record) = (&self.model, &record.record);
+        let found =
+            interruptible(py, None, |report| on_another_record(model, record, fit_start, report))?;
+        let result = PyDict::new(py);
+        result.set_item("error", figures(py, &found.error(record, remove_mean))?)?;
+        result.set_item("left_out", found.left_out)?;
+        let model = Self { model: found.model, identification: None, refinement: None };
+        result.set_item("model", Py::new(py, model)?)?;
+        Ok(result)
     }
 
     #[doc = include_str!("../docs/model/simulate.txt")]
@@ -133,11 +164,14 @@ impl Model {
         covariates: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (input, one_dimensional) = signal("u", u)?;
-        let output = match covariates {
-            None => self.model.simulate(&input),
-            Some(columns) => self.model.simulate_beside(&input, &signal("covariates", columns)?.0),
+        let columns = match covariates {
+            None => Matrix::zeros(input.nrows(), 0),
+            Some(columns) => signal("covariates", columns)?.0,
         };
-        Ok(from_signal(u.py(), output.map_err(to_python)?, one_dimensional))
+        // arrays have no column names
+        self.model.require_covariates(&vec![""; columns.ncols()]).map_err(to_python)?;
+        let output = self.model.simulate_beside(&input, &columns).map_err(to_python)?;
+        Ok(from_signal(u.py(), output, one_dimensional))
     }
 
     #[doc = include_str!("../docs/model/intermediate.txt")]
@@ -223,9 +257,10 @@ impl Model {
 
     #[doc = include_str!("../docs/model/from_json.txt")]
     #[staticmethod]
-    fn from_json(text: &str) -> PyResult<Self> {
+    fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
         let model = gpi_core::Model::from_json(text).map_err(to_python)?;
-        Ok(Self { model, identification: None, refinement: None })
+        let refinement = Refinement::saved(&model).map(|saved| Py::new(py, saved)).transpose()?;
+        Ok(Self { model, identification: None, refinement })
     }
 
     #[doc = include_str!("../docs/model/save.txt")]

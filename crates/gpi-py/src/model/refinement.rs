@@ -3,14 +3,19 @@
 use crate::arrays::{
     from_complex, from_matrices, from_matrix, from_signal, from_vector, signal, vector,
 };
-use crate::errors::to_python;
+use crate::errors::{parameter, to_python};
 use crate::plotting::plot;
-use gpi_core::Matrix;
-use gpi_core::identify::{self as core, NoiseMethod};
+use gpi_core::identify as core;
+use gpi_core::{Estimate, Estimates, Matrix};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// How a model was refined, and the uncertainty of its parameters.
+///
+/// A model file contains ``status``, ``parameters``, ``undetermined``, ``residual_rms``, ``noise_floor``, ``outliers`` and
+/// ``robust``. For a model that was loaded or unpickled, ``history``, ``covariance``, ``residuals``, ``poles``,
+/// ``markov_std``, ``response_std`` and ``loop_std`` raise a ``ParameterError``; ``gpi.refine`` computes them again from the
+/// record.
 ///
 /// Examples
 /// --------
@@ -21,52 +26,85 @@ use pyo3::types::PyDict;
 /// ['u.weights[0]', 'u.weights[1]']
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Refinement {
-    pub(crate) refinement: core::Refinement,
+    /// What model files contain.
+    estimates: Estimates,
+    /// All of it, for a model that was not loaded.
+    refinement: Option<core::Refinement>,
 }
 
 impl Refinement {
-    /// (outputs, inputs).
-    fn shape(&self) -> (usize, usize) {
-        self.refinement.bands.shape()
+    /// The refinement of a model.
+    pub(crate) fn new(model: &gpi_core::Model, refinement: core::Refinement) -> PyResult<Self> {
+        let estimates = match model.estimates() {
+            Some(estimates) => estimates.clone(),
+            None => refinement.estimates(model).map_err(to_python)?,
+        };
+        Ok(Self { estimates, refinement: Some(refinement) })
     }
+
+    /// What the file of a model contains of its refinement.
+    pub(super) fn saved(model: &gpi_core::Model) -> Option<Self> {
+        model.estimates().map(|estimates| Self { estimates: estimates.clone(), refinement: None })
+    }
+
+    /// What only a refinement that was not loaded has; `name` is what is asked for.
+    fn whole(&self, name: &str) -> PyResult<&core::Refinement> {
+        self.refinement.as_ref().ok_or_else(|| {
+            parameter(format!(
+                "`{name}` is not saved in model files; refine the model on its record (gpi.refine) to compute it again"
+            ))
+        })
+    }
+
+    /// (outputs, inputs).
+    fn shape(whole: &core::Refinement) -> (usize, usize) {
+        whole.bands.shape()
+    }
+}
+
+/// An estimate as a dictionary.
+pub(super) fn estimate<'py>(py: Python<'py>, one: &Estimate) -> PyResult<Bound<'py, PyDict>> {
+    let row = PyDict::new(py);
+    row.set_item("name", &one.name)?;
+    row.set_item("value", one.value)?;
+    row.set_item("std", one.std)?;
+    row.set_item("unit", &one.unit)?;
+    row.set_item("determined", one.determined)?;
+    Ok(row)
 }
 
 #[pymethods]
 impl Refinement {
     /// How the optimization ended: ``converged``, ``stalled`` (no step reduces the cost) or ``limit`` (of the number of steps).
     #[getter]
-    fn status(&self) -> &'static str {
-        self.refinement.status.name()
+    fn status(&self) -> &str {
+        &self.estimates.status
     }
 
     /// Root mean square residual at the start and after every accepted step, shape (steps + 1,), in the output's unit. Several
     /// outputs are weighted by their residuals.
     #[getter]
-    fn history<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        from_vector(py, &self.refinement.history)
+    fn history<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(from_vector(py, &self.whole("history")?.history))
     }
 
-    /// The estimated parameters: rows of ``name``, ``value`` and ``std``, both in the parameter's own unit.
+    /// The estimated parameters: rows of ``name``, ``value`` and ``std``, both in ``unit``, and ``determined``.
     ///
-    /// ``std`` is None if the parameter is unidentifiable, and 0 for a weight at its bound. Weights and half-widths are numbered
-    /// as in ``model.hysteresis[i].plays``, deadzones as in its ``envelope``. ``section[i].a1`` and so on are the coefficients of
-    /// G, written as a sum of parallel sections ``(b1 z + b2 + ..) / (z^2 + a1 z + a2)``; ``poles`` is easier to interpret.
+    /// ``std`` is None if the parameter is unidentifiable, and 0 for a weight at its bound. ``unit`` is empty for a pure number
+    /// or if it is unknown. ``determined`` is False if the parameter is unidentifiable, and for weights and coefficients of
+    /// numerators, whose zero means absence, if the 95 % interval ``value ± 1.96 std`` holds zero. Weights and half-widths are
+    /// numbered as in ``model.hysteresis[i].plays``, deadzones as in its ``envelope``. ``section[i].a1`` and so on are the
+    /// coefficients of G, written as a sum of parallel sections ``(b1 z + b2 + ..) / (z^2 + a1 z + a2)``; ``poles`` is easier
+    /// to interpret.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let row = |parameter: &core::Parameter| {
-            let row = PyDict::new(py);
-            row.set_item("name", &parameter.name)?;
-            row.set_item("value", parameter.value)?;
-            row.set_item("std", Some(parameter.deviation).filter(|std| std.is_finite()))?;
-            Ok(row)
-        };
-        self.refinement.parameters.iter().map(row).collect()
+        self.estimates.parameters.iter().map(|one| estimate(py, one)).collect()
     }
 
     /// Covariance of ``parameters``, (T5) in the theory, shape (parameters, parameters), each in the product of two units.
     #[getter]
-    fn covariance<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        from_matrix(py, &self.refinement.covariance)
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(from_matrix(py, &self.whole("covariance")?.covariance))
     }
 
     /// Unidentifiable parameters: the linear combinations of parameters that the data do not determine.
@@ -74,20 +112,21 @@ impl Refinement {
     /// Each combination is a list of pairs of name and coefficient (a pure number of either sign), the largest coefficient first.
     #[getter]
     fn undetermined(&self) -> Vec<Vec<(String, f64)>> {
-        self.refinement.undetermined.clone()
+        self.estimates.undetermined.clone()
     }
 
     /// Root mean square residual of each output on the training data, shape (outputs,), in its unit.
     #[getter]
     fn residual_rms<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        from_vector(py, &self.refinement.residual_rms)
+        from_vector(py, &self.estimates.residual_rms)
     }
 
     /// Measured minus simulated output of each experiment, each (samples, outputs), in the outputs' units. The simulation
     /// starts from the estimated initial states.
     #[getter]
-    fn residuals<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
-        self.refinement.residuals.iter().map(|residual| from_matrix(py, residual)).collect()
+    fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let residuals = &self.whole("residuals")?.residuals;
+        Ok(residuals.iter().map(|residual| from_matrix(py, residual)).collect())
     }
 
     /// The noise floor of each output; (T6) in the theory if the input is periodic.
@@ -96,14 +135,14 @@ impl Refinement {
     /// ``period`` (in samples) or the number of ``samples`` from which it was estimated.
     #[getter]
     fn noise_floor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let floor = &self.refinement.noise_floor;
+        let floor = &self.estimates.noise_floor;
         let result = PyDict::new(py);
         result.set_item("rms", floor.rms.clone())?;
-        result.set_item("how", floor.method.name())?;
-        match floor.method {
-            NoiseMethod::RepeatedPeriods { period } => result.set_item("period", period)?,
-            NoiseMethod::Rests { samples } => result.set_item("samples", samples)?,
-            NoiseMethod::HighFrequencyResidual => {}
+        result.set_item("how", &floor.how)?;
+        for (name, count) in [("period", floor.period), ("samples", floor.samples)] {
+            if let Some(count) = count {
+                result.set_item(name, count)?;
+            }
         }
         Ok(result)
     }
@@ -111,13 +150,13 @@ impl Refinement {
     /// Number of isolated outliers in the residual.
     #[getter]
     fn outliers(&self) -> usize {
-        self.refinement.outliers
+        self.estimates.outliers
     }
 
     /// Whether Huber's loss was used.
     #[getter]
     fn robust(&self) -> bool {
-        self.refinement.robust
+        self.estimates.robust
     }
 
     /// Poles of G without those of its dead time, and their standard deviations.
@@ -128,7 +167,7 @@ impl Refinement {
     ///     The poles, and the standard deviations of their real parts (in the real part) and imaginary parts (in the
     ///     imaginary part); no unit.
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let poles = self.refinement.bands.poles().map_err(to_python)?;
+        let poles = self.whole("poles")?.bands.poles().map_err(to_python)?;
         Ok((from_complex(py, poles.poles), from_complex(py, poles.deviations)))
     }
 
@@ -144,8 +183,9 @@ impl Refinement {
     /// ndarray, shape (outputs, inputs, count)
     ///     The standard deviations, in output units per unit of v.
     fn markov_std<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyAny>> {
-        let deviations = self.refinement.bands.markov_deviations(count).map_err(to_python)?;
-        Ok(from_matrices(py, self.shape(), &deviations))
+        let whole = self.whole("markov_std")?;
+        let deviations = whole.bands.markov_deviations(count).map_err(to_python)?;
+        Ok(from_matrices(py, Self::shape(whole), &deviations))
     }
 
     /// Standard deviations of the frequency response of G.
@@ -165,11 +205,11 @@ impl Refinement {
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let py = angles.py();
         let angles = vector("angles", angles)?;
-        let found =
-            py.detach(|| self.refinement.bands.response_deviations(&angles)).map_err(to_python)?;
+        let whole = self.whole("response_std")?;
+        let found = py.detach(|| whole.bands.response_deviations(&angles)).map_err(to_python)?;
         let stack = |part: fn(&core::ResponseDeviation) -> &Matrix| {
             let values: Vec<Matrix> = found.iter().map(|at| part(at).clone()).collect();
-            from_matrices(py, self.shape(), &values).call_method1("transpose", (2, 0, 1))
+            from_matrices(py, Self::shape(whole), &values).call_method1("transpose", (2, 0, 1))
         };
         Ok((stack(|at| &at.log_magnitude)?, stack(|at| &at.phase)?))
     }
@@ -187,7 +227,7 @@ impl Refinement {
     ///     The standard deviations, in the unit of v.
     fn loop_std<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (input, one_dimensional) = signal("u", u)?;
-        let found = self.refinement.bands.loop_deviations(&input).map_err(to_python)?;
+        let found = self.whole("loop_std")?.bands.loop_deviations(&input).map_err(to_python)?;
         Ok(from_signal(u.py(), found, one_dimensional))
     }
 
@@ -203,12 +243,12 @@ impl Refinement {
     }
 
     fn __repr__(&self) -> String {
-        format!(
-            "Refinement({}, {} parameters, rms {:.4e} -> {:.4e})",
-            self.refinement.status.name(),
-            self.refinement.parameters.len(),
-            self.refinement.history.first().copied().unwrap_or(f64::NAN),
-            self.refinement.history.last().copied().unwrap_or(f64::NAN)
-        )
+        let count = self.estimates.parameters.len();
+        let rms = self.refinement.as_ref().map_or_else(String::new, |whole| {
+            let at = |place: Option<&f64>| place.copied().unwrap_or(f64::NAN);
+            let (first, last) = (at(whole.history.first()), at(whole.history.last()));
+            format!(", rms {first:.4e} -> {last:.4e}")
+        });
+        format!("Refinement({}, {count} parameters{rms})", self.estimates.status)
     }
 }

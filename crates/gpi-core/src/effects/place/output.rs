@@ -52,6 +52,11 @@ pub trait Added: Block {
         Vec::new()
     }
 
+    /// The measured column that it is made of, if any: its place among the record's covariates, and its name.
+    fn column(&self) -> Option<(usize, &str)> {
+        None
+    }
+
     /// The signal at one sample.
     fn add(&self, state: &mut [f64], moment: Moment) -> f64;
 }

@@ -18,7 +18,7 @@
 
 use super::compared::Compared;
 use super::families::{Family, Regressor};
-use super::outcome::ResidualTest;
+use super::outcome::{ResidualTest, Significance};
 use super::policy::ResidualPolicy;
 use super::significance::{normal_beyond, normal_tails};
 
@@ -85,12 +85,14 @@ pub(super) fn dependence(
 ) -> ResidualTest {
     let statistic = each.iter().map(|t| t.abs()).fold(0.0, f64::max);
     let regressors = each.len().max(1) as f64;
+    let tail = |t: f64| regressors * normal_tails(t);
+    let threshold = normal_beyond(significance / regressors).max(policy.standard_errors);
     ResidualTest {
         name,
         output,
         statistic,
-        threshold: normal_beyond(significance / regressors).max(policy.standard_errors),
-        p_value: (regressors * normal_tails(statistic)).min(1.0),
+        threshold,
+        significance: Some(Significance::new(tail, statistic, threshold)),
         points_to,
     }
 }

@@ -12,7 +12,7 @@
 //! the phase.
 
 use super::compared::Compared;
-use super::outcome::{ResidualTest, points_to};
+use super::outcome::{ResidualTest, Significance, points_to};
 use super::policy::ResidualPolicy;
 use super::significance::exceeded_with;
 use crate::Matrix;
@@ -75,12 +75,13 @@ pub(super) fn lines(given: &Compared, output: usize, significance: f64) -> Resid
         }
     }
     let tail = |ratio: f64| count.max(1.0) * single_above(ratio, around);
+    let threshold = exceeded_with(significance, tail);
     ResidualTest {
         name: "lines",
         output,
         statistic: most,
-        threshold: exceeded_with(significance, tail),
-        p_value: tail(most).min(1.0),
+        threshold,
+        significance: Some(Significance::new(tail, most, threshold)),
         points_to: points_to("lines", ""),
     }
 }

@@ -1,7 +1,8 @@
 //! Named tests of a residual, each with the effects that it points to.
 //!
-//! The significance level of every test is one hundredth over the number of tests (Bonferroni's correction), so that at
-//! most one record of pure noise in a hundred fails any of them.
+//! The significance level of every test is at most one hundredth over the number of tests (Bonferroni's correction), so
+//! that at most one record of pure noise in a hundred fails any of them. A test with a p-value fails exactly where the
+//! p-value is below its level. A test whose threshold is one of practical size has no p-value.
 //!
 //! | test | statistic | if the residual e is noise |
 //! |---|---|---|
@@ -38,8 +39,8 @@ use crate::identify::{Progress, residuals_from_fitted_start};
 use crate::{Error, Matrix, Model, Record};
 use compared::Compared;
 use families::{Family, ScaledSignals};
-pub use outcome::ResidualTest;
 use outcome::{NAMES, points_to};
+pub use outcome::{ResidualTest, Significance};
 pub(super) use outcome::{STRUCTURE, WHITENESS};
 use policy::ResidualPolicy;
 

@@ -11,33 +11,55 @@ pub struct ResidualTest {
     pub output: usize,
     /// What is compared with the threshold.
     pub statistic: f64,
-    /// The value that the statistic must not exceed. It does so with a probability of a hundredth over the
-    /// number of tests (of all outputs) where there is nothing.
+    /// The value that the statistic must not exceed.
     ///
-    /// It is raised where that would be of no practical size: for `whiteness` to a hundredth of the
-    /// residual's variance in its correlations; for the statistics t of `mean`, `level-to-level`,
-    /// `higher-order` and all dependences, whose regressors share the probability, to 4; for `prediction` it is the
-    /// part of the variance that the input may predict. `outliers` allows two.
+    /// It belongs to the significance level, see [`Significance::level`], or is one of practical size: for
+    /// `prediction` it is the part of the variance that the input may predict; `outliers` allows two; for `whiteness`
+    /// it is a hundredth of the residual's variance in its correlations wherever that is more than noise gives.
     pub threshold: f64,
-    /// The probability, at most, that a residual without structure gives a statistic this large or larger; all
-    /// regressors or lines of this one test are allowed for, the other tests are not.
-    pub p_value: f64,
+    /// How probable the statistic is in noise. None where the threshold is one of practical size: the residual may then
+    /// differ from noise beyond doubt and pass, since the difference is too small to matter.
+    pub significance: Option<Significance>,
     /// What it points to when it fails.
     pub points_to: String,
 }
 
+/// How probable a statistic is where the residual has no structure, and how improbable it must be to fail the test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Significance {
+    /// The probability, at most, that a residual without structure gives a statistic this large or larger; all
+    /// regressors or lines of this one test are allowed for, the other tests are not.
+    pub p_value: f64,
+    /// The significance level, `p(threshold)`: the test fails if the p-value is below it. It is a hundredth over the
+    /// number of tests of all outputs; for the statistics t of `mean`, `level-to-level`, `higher-order` and all
+    /// dependences at most the probability of four standard errors.
+    pub level: f64,
+}
+
+impl Significance {
+    /// Of a statistic and its threshold, from the tail probability, a falling function.
+    pub(super) fn new(tail: impl Fn(f64) -> f64, statistic: f64, threshold: f64) -> Self {
+        Self { p_value: tail(statistic).min(1.0), level: tail(threshold).min(1.0) }
+    }
+}
+
 impl ResidualTest {
-    /// Whether the residual shows nothing here: `statistic <= threshold`.
+    /// Whether the residual shows nothing here: `p_value >= level`, or `statistic <= threshold` where the threshold is
+    /// one of practical size. Both say the same where there is a p-value, since the level is that of the threshold.
     ///
     /// ```
-    /// use gpi_core::explain::ResidualTest;
+    /// use gpi_core::explain::{ResidualTest, Significance};
     /// let test = ResidualTest {
-    ///     name: "mean", output: 0, statistic: 3.5, threshold: 4.0, p_value: 5e-4, points_to: String::new(),
+    ///     name: "mean", output: 0, statistic: 3.5, threshold: 4.0,
+    ///     significance: Some(Significance { p_value: 5e-4, level: 6e-5 }), points_to: String::new(),
     /// };
     /// assert!(test.passed()); // rare by itself, but not among all tests of a record
     /// ```
     pub fn passed(&self) -> bool {
-        self.statistic <= self.threshold
+        match self.significance {
+            Some(Significance { p_value, level }) => p_value >= level,
+            None => self.statistic <= self.threshold,
+        }
     }
 }
 

@@ -62,8 +62,6 @@ settings! {
         /// Lags in samples of the signals' levels, and half-widths of the plays, 1 being half of a signal's range. By hand.
         predicted_lags: [usize; 8] = [0, 1, 2, 4, 8, 16, 32, 64], 0.0..=1e6;
         predicted_plays: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7], PART;
-        /// Probability that a normal number lies beyond the six standard deviations of a wrong sample.
-        six_deviations: f64 = 2e-9, PART;
         /// Wrong samples that are allowed: too few to look for a cause. By hand.
         wrong_samples: f64 = 2.0, 0.0..=1e6;
     }

@@ -25,11 +25,6 @@ pub(in crate::explain) fn chi_square_tail(value: f64, freedom: f64) -> f64 {
     gamma::gamma_ur(0.5 * freedom, 0.5 * value.max(1e-300))
 }
 
-/// The probability of at least `count` events where so many are expected (Poisson).
-pub(super) fn at_least(count: usize, expected: f64) -> f64 {
-    if count == 0 { 1.0 } else { gamma::gamma_lr(count as f64, expected.max(1e-300)) }
-}
-
 /// Where a falling tail comes down to a probability.
 pub(in crate::explain) fn exceeded_with(significance: f64, tail: impl Fn(f64) -> f64) -> f64 {
     const DOUBLINGS: usize = 60;
@@ -59,6 +54,5 @@ mod tests {
         assert!((normal_tails(normal_beyond(1e-6)) / 1e-6 - 1.0).abs() < 1e-6);
         let value = exceeded_with(0.01, |value| chi_square_tail(value, 25.0));
         assert!((value - 44.314).abs() < 1e-3);
-        assert!((at_least(2, 0.5) - (1.0 - 1.5 * (-0.5_f64).exp())).abs() < 1e-12);
     }
 }

@@ -1,5 +1,6 @@
 //! The tests on records of a known model with a known residual.
 
+use super::outcome::PREDICTION;
 use super::*;
 use crate::linear::TransferFunction;
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
@@ -85,10 +86,71 @@ fn every_test_has_its_name_and_threshold() {
     assert_eq!(tests.iter().map(|test| test.name).collect::<Vec<_>>(), NAMES);
     let chance = 0.01 / NAMES.len() as f64;
     for test in &tests {
-        assert!(test.passed() || test.p_value < chance, "{test:?}");
-        assert!((0.0..=1.0).contains(&test.p_value), "{test:?}");
+        let Some(Significance { p_value, level }) = test.significance else { continue };
+        assert!((0.0..=1.0).contains(&p_value), "{test:?}");
+        assert!(level > 0.0 && level <= chance * (1.0 + 1e-6), "{test:?}");
     }
+    let without: Vec<&str> =
+        tests.iter().filter(|test| test.significance.is_none()).map(|test| test.name).collect();
+    assert_eq!(without, [PREDICTION, "outliers"]);
     assert!(STRUCTURE.iter().all(|name| NAMES.contains(name)));
+}
+
+#[test]
+fn decision_threshold_and_p_value_agree() {
+    let u = drive();
+    let sized = |size: f64| -> Vec<Vec<f64>> {
+        vec![
+            with(size, |_| 1.0),
+            with(size, |k| (0.314 * k as f64).sin()),
+            with(size, |k| u[k]),
+            with(size, |k| u[k].abs()),
+            with(size, |k| k as f64),
+            with(size, |k| f64::from(u8::from(k % 999 == 5))),
+            with(size, |k| coloured(3)[k]),
+        ]
+    };
+    let residuals: Vec<Vec<f64>> = [0.0, 0.03, 0.1, 0.2, 0.5, 3.0, 1e3]
+        .into_iter()
+        .flat_map(sized)
+        .chain([coloured(5), vec![0.0; SAMPLES]])
+        .collect();
+    let (mut failures, mut passes) = (vec![0; NAMES.len()], vec![0; NAMES.len()]);
+    for residual in &residuals {
+        for (place, test) in tested(residual).iter().enumerate() {
+            assert_eq!(test.passed(), test.statistic <= test.threshold, "{test:?}");
+            if let Some(Significance { p_value, level }) = test.significance {
+                assert_eq!(test.passed(), p_value >= level, "{test:?}");
+            }
+            if test.passed() { passes[place] += 1 } else { failures[place] += 1 }
+        }
+    }
+    // both decisions were seen of all tests but those of what is none of these signals
+    assert!(passes.iter().all(|&count| count > 0), "{passes:?}");
+    assert!(failures.iter().filter(|&&count| count > 0).count() >= 10, "{failures:?}");
+}
+
+/// The autocorrelation of a residual that is large against noise and small in size has no p-value.
+#[test]
+fn small_correlations_of_a_long_record_pass_without_a_p_value() {
+    let longer: Vec<f64> = (0..25).flat_map(|seed| noise(seed)).collect();
+    let residual = |k: usize| longer[k] + 0.06 * longer[k.saturating_sub(1)];
+    let record = |samples: usize| {
+        let u: Vec<f64> = drive().into_iter().cycle().take(samples).collect();
+        let input = Matrix::from_column_slice(samples, 1, &u);
+        let disturbance = Matrix::from_fn(samples, 1, |k, _| 0.1 * residual(k));
+        let output = model().simulate(&input).unwrap() + disturbance;
+        recorded(&[0.0; SAMPLES]).with_experiments(vec![Experiment::new(input, output)]).unwrap()
+    };
+    let of = |samples: usize| {
+        let options = ResidualOptions::default();
+        let tests = residual_tests(&model(), &record(samples), &options, &mut |_, _| true).unwrap();
+        tests.into_iter().find(|test| test.name == WHITENESS).unwrap()
+    };
+    let (short, long) = (of(SAMPLES), of(longer.len()));
+    assert!(short.significance.is_some());
+    assert!(long.significance.is_none() && long.passed());
+    assert!(significance::chi_square_tail(long.statistic, 25.0) < 1e-20);
 }
 
 #[test]

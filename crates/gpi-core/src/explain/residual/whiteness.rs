@@ -10,10 +10,13 @@
 //! `small n`, which is reached where `sum_k r_k^2` is about `small`.
 
 use super::compared::Compared;
-use super::outcome::{ResidualTest, WHITENESS, points_to};
+use super::outcome::{ResidualTest, Significance, WHITENESS, points_to};
 use super::significance::{chi_square_tail, exceeded_with};
 
 /// Ljung and Box: `Q = n (n + 2) sum_k r_k^2 / (n - k)` over the first lags of the autocorrelation.
+///
+/// In white noise, Q is chi-square distributed. In long records Q shows correlations far below any practical size; the
+/// threshold is then a part of the variance, `Q / n = sum_k r_k^2`, and there is no p-value.
 pub(super) fn whiteness(given: &Compared, output: usize, significance: f64) -> ResidualTest {
     let lags = given.policy.lags;
     let mut covariances = vec![0.0; lags + 1];
@@ -33,12 +36,15 @@ pub(super) fn whiteness(given: &Compared, output: usize, significance: f64) -> R
         .sum();
     let statistic = n * (n + 2.0) * sum;
     let tail = |value: f64| chi_square_tail(value, lags as f64);
+    let (of_noise, of_size) = (exceeded_with(significance, tail), given.policy.small * n);
+    // beyond, the question is no longer whether the correlations are zero but whether they are small
+    let is_of_noise = of_noise >= of_size;
     ResidualTest {
         name: WHITENESS,
         output,
         statistic,
-        threshold: exceeded_with(significance, tail).max(given.policy.small * n),
-        p_value: tail(statistic),
+        threshold: of_noise.max(of_size),
+        significance: is_of_noise.then(|| Significance::new(tail, statistic, of_noise)),
         points_to: points_to(WHITENESS, "dynamics that the model lacks"),
     }
 }
