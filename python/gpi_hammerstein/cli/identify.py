@@ -148,6 +148,7 @@ def identify(
         "mean_removed": remove_mean,
         "start_fitted": fit_start,
         "error": error,
+        "rivals": native.rivals(train, test),
         "files": [],
     }
     if out is not None:
