@@ -30,8 +30,8 @@ def to_dict(found: Explanation) -> dict[str, Any]:
     dict
         ``schema``, ``record``, ``noise_floor``, ``effects``, ``steps``, ``moved_resonance``, ``stage``,
         ``rejected``, ``error`` (before and after, each for train and holdout), ``residual`` (whether it is
-        structured, and its tests), ``rivals``, ``verdict``, ``verdict_reason``, ``notes``, ``next_experiment``,
-        ``wrong_samples``, ``interrupted``.
+        structured, and its tests), ``rivals``, ``verdict``, ``verdict_reason``, ``notes``,
+        ``next_experiment``, ``wrong_samples``, ``interrupted``.
 
     Examples
     --------

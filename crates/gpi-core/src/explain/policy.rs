@@ -278,8 +278,8 @@ settings! {
         ridge: f64 = 1e-8, PART;
         /// Part of the rms error that a rival must take: less is of no use. By hand.
         useful: f64 = 0.05, PART;
-        /// Standard errors of the mean difference between blocks. With ten blocks and four rivals, 3 % of equal rivals
-        /// win by chance.
+        /// Standard errors of the mean logarithm of the blocks' ratios. With ten blocks and four rivals, 3 % of equal
+        /// rivals win by chance.
         standard_errors: f64 = 3.0, 0.0..=100.0;
         /// Blocks of held-out time at least, for a standard error of their differences.
         parts: usize = 10, FROM_ONE;

@@ -48,12 +48,15 @@ pub struct Rival {
     pub detail: String,
 }
 
+/// The simulated outputs of a record, (samples, outputs), one matrix an experiment.
+type Simulate = dyn Fn(&Record) -> Vec<Matrix> + Send;
+
 /// A rival that has been fitted to a record in the units of [`Units`].
 struct Model {
     name: &'static str,
     detail: String,
-    /// The simulated outputs of a record in the same units, (samples, outputs), one an experiment.
-    simulate: Box<dyn Fn(&Record) -> Vec<Matrix> + Send>,
+    /// Of a record in the same units.
+    simulate: Box<Simulate>,
 }
 
 /// A rival with what it leaves of the data.
@@ -121,6 +124,7 @@ pub(crate) fn fit(
     holdout: Option<&Record>,
     policy: &RivalPolicy,
 ) -> Result<Vec<Fitted>, Error> {
+    policy.validate()?;
     if let Some(other) = holdout {
         let own = ("training inputs", training.inputs().len());
         Error::require_equal("channels", own, ("held-out inputs", other.inputs().len()))?;

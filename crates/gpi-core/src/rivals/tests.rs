@@ -52,8 +52,11 @@ fn deviation(record: &Record) -> f64 {
     SimulationError::of(record, &zero, false).rms
 }
 
-/// One output a row; each is a function of the whole input.
-fn outputs(u: &Matrix, of: [&dyn Fn(&[f64], &[f64]) -> Vec<f64>; 2]) -> Matrix {
+/// An output as a function of both inputs.
+type Plant<'a> = &'a dyn Fn(&[f64], &[f64]) -> Vec<f64>;
+
+/// The outputs of two plants.
+fn outputs(u: &Matrix, of: [Plant; 2]) -> Matrix {
     let columns: Vec<Vec<f64>> = u.column_iter().map(|c| c.iter().copied().collect()).collect();
     let values = of.map(|of| nalgebra::DVector::from_vec(of(&columns[0], &columns[1])));
     Matrix::from_columns(&values)

@@ -1,7 +1,8 @@
 //! Whether a simple model predicts held-out data better.
 //!
 //! The squares of the final model and of a rival are compared block by block of held-out time. The rival wins if its rms is
-//! lower by a useful part, and if the mean difference of the blocks exceeds its standard error by a factor.
+//! lower by a useful part, and if the mean logarithm of the blocks' ratios exceeds its standard error by a factor. Ratios and
+//! not differences are averaged, because a few blocks of large amplitude would decide alone.
 
 use crate::explain::policy::OutsidePolicy;
 use crate::rivals::Fitted;
@@ -39,12 +40,15 @@ fn blocks(test: &Record, residuals: &[Matrix], least: usize) -> Vec<f64> {
 
 /// Whether a rival's squares are lower than the model's.
 fn wins(model: &[f64], rival: &[f64], policy: &OutsidePolicy) -> bool {
-    let differences: Vec<f64> = model.iter().zip(rival).map(|(a, b)| a - b).collect();
-    let n = differences.len() as f64;
-    let mean = differences.iter().sum::<f64>() / n;
-    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    let rms = |blocks: &[f64]| blocks.iter().sum::<f64>().sqrt();
-    rms(rival) < (1.0 - policy.useful) * rms(model)
+    let [all, rivals] = [model, rival].map(|blocks| blocks.iter().sum::<f64>());
+    // blocks that are exact would decide alone
+    let least = f64::EPSILON.sqrt() * (all + rivals) + f64::MIN_POSITIVE;
+    let ratio = |(a, b): (&f64, &f64)| ((a + least) / (b + least)).ln();
+    let ratios: Vec<f64> = model.iter().zip(rival).map(ratio).collect();
+    let n = ratios.len() as f64;
+    let mean = ratios.iter().sum::<f64>() / n;
+    let variance = ratios.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    rivals.sqrt() < (1.0 - policy.useful) * all.sqrt()
         && mean > policy.standard_errors * (variance / n).sqrt()
 }
 
@@ -63,8 +67,10 @@ mod tests {
         assert!(wins(&MODEL, &scaled(0.8), &policy));
         assert!(!wins(&MODEL, &scaled(0.95), &policy), "less than 5 % of the rms is of no use");
         let mut in_one = MODEL;
-        (in_one[1], in_one[3]) = (0.0, 0.0);
+        (in_one[1], in_one[3]) = (2.0, 2.0);
         assert!(!wins(&MODEL, &in_one, &policy), "two blocks may be chance");
+        let loud = [1.0, 2.0, 300.0, 1.0, 2.0, 100.0, 1.0, 2.0, 30.0, 1.0];
+        assert!(wins(&loud, &loud.map(|square| 0.5 * square), &policy), "of any amplitude");
     }
 
     #[test]
