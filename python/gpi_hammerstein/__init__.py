@@ -52,6 +52,7 @@ from gpi_hammerstein._native import (
     prbs,
     refine,
     residual_tests,
+    rivals,
     sensitivities,
 )
 from gpi_hammerstein.export import export_c, export_rust
@@ -105,6 +106,7 @@ __all__ = [
     "read_record",
     "refine",
     "residual_tests",
+    "rivals",
     "save",
     "sensitivities",
 ]

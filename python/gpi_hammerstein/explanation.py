@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from gpi_hammerstein._native import Explanation, effect_names
+from gpi_hammerstein.comparison import compared_in_words
 from gpi_hammerstein.stage import stage, stage_in_words
 from gpi_hammerstein.uncertain import NOT_DETERMINED, spread
 
@@ -30,7 +31,8 @@ def to_dict(found: Explanation) -> dict[str, Any]:
     dict
         ``schema``, ``record``, ``noise_floor``, ``effects``, ``steps``, ``moved_resonance``, ``stage``,
         ``rejected``, ``error`` (before and after, each for train and holdout), ``residual`` (whether it is
-        structured, and its tests), ``verdict``, ``next_experiment``, ``wrong_samples``, ``interrupted``.
+        structured, and its tests), ``rivals``, ``verdict``, ``verdict_reason``, ``notes``,
+        ``next_experiment``, ``wrong_samples``, ``interrupted``.
 
     Examples
     --------
@@ -69,7 +71,10 @@ def to_dict(found: Explanation) -> dict[str, Any]:
             "structured": found.verdict != "explained",
             "tests": [{key: test[key] for key in keys} for test in found.tests],
         },
+        "rivals": found.rivals,
         "verdict": found.verdict,
+        "verdict_reason": found.verdict_reason,
+        "notes": found.notes,
         "next_experiment": found.next_experiment,
         "wrong_samples": found.wrong_samples,
         "interrupted": found.interrupted,
@@ -156,11 +161,16 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
         yield from failed_in_words(tests)
     elif failed:
         yield f"The residual fails the test{'s' if len(failed) > 1 else ''} {join(failed)}."
+    yield from compared_in_words(result["rivals"], after, unit)
+    yield from result["notes"]
     yield {
         "explained": "Verdict: explained. The residual has no structure beyond noise.",
         "partly-explained": "Verdict: partly explained. The residual still has structure.",
         "unattributed": "Verdict: unattributed. The residual has structure that no effect explains.",
+        "outside-class": "Verdict: outside the class of this model. Its structure is wrong for this record.",
     }[result["verdict"]]
+    if result["verdict_reason"]:
+        yield f"Reason: {result['verdict_reason']}."
     if result["next_experiment"]:
         yield f"Next experiment: {result['next_experiment']['why']}."
 

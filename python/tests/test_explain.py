@@ -216,7 +216,10 @@ def test_the_contract_of_the_answer():
     assert [step["effect"] for step in answer["steps"][1:]].count("periodic-disturbance") >= 1
     assert {"value", "std", "unit"} == set(answer["steps"][1]["parameters"]["frequency"])
     assert {"name", "statistic", "threshold", "passed"} <= set(answer["residual"]["tests"][0])
-    assert answer["verdict"] in ("explained", "partly-explained", "unattributed")
+    assert answer["verdict"] in ("explained", "partly-explained", "unattributed", "outside-class")
+    assert (answer["verdict"] == "outside-class") == (answer["verdict_reason"] is not None)
+    assert [row["name"] for row in answer["rivals"]] == ["static-polynomial", "plays", "fir", "arx"]
+    assert set(answer["rivals"][0]) == {"name", "detail", "train_rms", "holdout_rms"}
     json.dumps(answer)
     words = " ".join(in_words(answer, "um"))
     assert "periodic-disturbance" in words and "um" in words and "Verdict" in words

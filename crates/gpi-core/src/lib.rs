@@ -48,6 +48,8 @@ mod progress;
 #[cfg(feature = "identify")]
 mod record;
 #[cfg(feature = "identify")]
+pub mod rivals;
+#[cfg(feature = "identify")]
 mod settings;
 #[cfg(feature = "identify")]
 mod simulation_error;

@@ -15,6 +15,7 @@ mod operators;
 mod plotting;
 mod progress;
 mod record;
+mod rivals;
 
 use pyo3::prelude::*;
 
@@ -29,5 +30,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     compensate::register(module)?;
     identify::register(module)?;
     explain::register(module)?;
+    rivals::register(module)?;
     excitation::register(module)
 }

@@ -21,6 +21,7 @@ from gpi_hammerstein.cli.output import (
     picture,
     print_json,
     progress_bar,
+    rival_table,
     say_written,
     working,
     write_json,
@@ -183,6 +184,7 @@ def summarise(screen: Console, result: dict[str, Any], unit: str, out: Path | No
         screen.print(f"[yellow]note[/] {escape(note)}")
     screen.print(f"Held-out data: {escape(result['holdout'])}")
     screen.print(before_and_after(result, unit))
+    screen.print(rival_table(result["rivals"], unit))
     for sentence in in_words(result, unit):
         screen.print(escape(sentence))
     if result["next_experiment"] and result["next_experiment"]["command"]:

@@ -11,7 +11,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from gpi_hammerstein._native import Identification, Model, Refinement
-from gpi_hammerstein.cli.output import error_table, say_written
+from gpi_hammerstein.cli.output import error_table, rival_table, say_written
+from gpi_hammerstein.comparison import compared_in_words
 
 HOW = {
     "repeated-periods": "from repeated periods of the input",
@@ -122,6 +123,12 @@ def summarise(screen: Console, result: Mapping[str, Any], model: Model, unit: st
             f"Simulation error (held out: {result['rule']})",
         )
     )
+    screen.print(rival_table(result["rivals"], unit))
+    held_out = result["error"]["holdout"]
+    # the rivals keep the offset of the training data
+    own = None if held_out is None or result["mean_removed"] else held_out["rms"]
+    for sentence in compared_in_words(result["rivals"], own, unit):
+        screen.print(escape(sentence))
     say_written(screen, out, result["files"])
 
 

@@ -151,6 +151,7 @@ def identify(
         "start_fitted": fit_start,
         "rule": rule_in_words(**counted),
         "error": error,
+        "rivals": native.rivals(train, test),
         "files": [],
     }
     if out is not None:

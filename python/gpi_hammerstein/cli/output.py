@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 
 from gpi_hammerstein._native import GpiError, Record
+from gpi_hammerstein.comparison import rival_rows
 from gpi_hammerstein.io import Recording
 
 if TYPE_CHECKING:
@@ -127,6 +128,19 @@ def error_table(rows: Mapping[str, Figures], unit: str = "", title: str = "Simul
             f"{figures['fit_percent']:.2f} %",
             f"{figures['max']:.4g}",
         )
+    return table
+
+
+def rival_table(rivals: Sequence[Mapping[str, Any]], unit: str = "") -> Table:
+    """Return a table of simple models and their errors on the same data."""
+    table = Table(title="Simple models", title_justify="left")
+    label = f" [{unit}]" if unit else ""
+    table.add_column("")
+    table.add_column("what was chosen")
+    for name in (f"rms, fitted{label}", f"rms, held out{label}"):
+        table.add_column(escape(name), justify="right")
+    for row in rival_rows(rivals):
+        table.add_row(*map(escape, row))
     return table
 
 

@@ -17,6 +17,7 @@ VERDICTS = {
     "explained": "Explained: the residual has no structure beyond noise.",
     "partly-explained": "Partly explained: the residual still has structure.",
     "unattributed": "Unattributed: no effect of the catalogue explains the residual.",
+    "outside-class": "Outside the class of this model: its structure is wrong for this record.",
 }
 # Pictures of each part of the page, by the beginning of their keys.
 PARTS: dict[str, tuple[str, ...]] = {
@@ -65,6 +66,7 @@ def report_html(found: Explanation, *, command: str | None = None, notes: Sequen
         sentences="".join(f"<p>{escape(sentence)}</p>" for sentence in rest),
         next_experiment=next_experiment(found),
         errors=tables.errors(found, unit),
+        rivals=tables.rivals(found, unit),
         effects=tables.effects(found),
         rejected=tables.rejected(found),
         loop=shown("loop"),

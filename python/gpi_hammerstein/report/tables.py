@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gpi_hammerstein._native import Explanation, Model, effect_names
+from gpi_hammerstein.comparison import rival_rows
 from gpi_hammerstein.held_out import rule_of
 from gpi_hammerstein.stage import natural
 from gpi_hammerstein.uncertain import NOT_DETERMINED, OF_SIZE, p_value_in_words, spread
@@ -46,6 +47,13 @@ def errors(found: Explanation, unit: str) -> str:
                 ]
             )
     return table(head, rows, range(1, 6)) + f"<p>Held out: {escape(rule_of(found))}.</p>"
+
+
+def rivals(found: Explanation, unit: str) -> str:
+    """Return the errors of simple models on the same data."""
+    label = f" [{unit}]" if unit else ""
+    head = ["simple model", "what was chosen", f"rms, fitted{label}", f"rms, held out{label}"]
+    return table(head, rival_rows(found.rivals), (2, 3))
 
 
 def effects(found: Explanation) -> str:

@@ -59,18 +59,3 @@ fn extremes(experiment: &Experiment) -> Vec<usize> {
     }
     places
 }
-
-/// The record in which what is held out is scored, and nothing else.
-pub(super) fn complement(training: &Record) -> Result<Record, Error> {
-    let test = training.experiments().iter().map(|experiment| {
-        let mut test = experiment.clone();
-        test.warmup = experiment.held_out.first().map_or(0, |held| held.start);
-        let starts = experiment.held_out.iter().map(|held| held.end);
-        let rows = experiment.input.nrows();
-        let next = experiment.held_out.iter().skip(1).map(|held| held.start);
-        let gaps = starts.zip(next.chain(std::iter::once(rows)));
-        test.held_out = gaps.filter(|(a, b)| a < b).map(|(a, b)| a..b).collect();
-        test
-    });
-    training.with_experiments(test.collect())
-}

@@ -2,6 +2,7 @@
 
 use super::moved_resonance::Resonance;
 use super::noise;
+use super::outside::{Situation, outside};
 use super::residual::{self, ResidualTest};
 use super::setup::SearchSetup;
 use super::state::{Addition, Rejected, SearchState};
@@ -10,6 +11,7 @@ use crate::chain::point::Point;
 use crate::effects::Effect;
 use crate::identify::on_another_record;
 use crate::identify::{Parameter, Refinement};
+use crate::rivals::{self, Fitted, Rival, RivalPolicy};
 use crate::{Error, Matrix, Model, Record, SimulationError};
 use std::ops::Range;
 
@@ -71,8 +73,14 @@ pub struct Explanation {
     /// A resonance whose frequency depends on the outputs' amplitude, at the smallest and at the largest amplitude.
     /// Where loops were closed around G, it rules out that something in front of G is the only cause.
     pub moved_resonance: Option<[Resonance; 2]>,
+    /// Simple models, scored on the same data as `after`.
+    pub rivals: Vec<Rival>,
     /// How far the record is explained.
     pub verdict: Verdict,
+    /// Why the declared structure is wrong, as clauses; none unless the verdict is [`Verdict::OutsideClass`].
+    pub reasons: Vec<String>,
+    /// What else the user should know of the record, in sentences.
+    pub notes: Vec<String>,
     /// What to measure next, where that would show more.
     pub next_experiment: Option<NextExperiment>,
     /// Isolated wrong samples, which are not scored: rows of each output, in each experiment.
@@ -104,18 +112,20 @@ pub(super) fn summarise(
         (base.residuals(measured)?, state.point.residuals(mended)?);
     let base = base.to_model(record, mended, means)?;
     let mut model = state.point.to_model(record, mended, means)?;
-    let errors = |record: &Record, model: &Model, residuals: &[Matrix]| -> Result<Errors, Error> {
-        let train = SimulationError::of(record, residuals, false);
-        let test = match holdout {
-            Some(other) => {
-                on_another_record(model, other, true, &mut |_, _| true)?.error(other, false)
-            }
-            None => SimulationError::of(&state.setup.test, residuals, false),
-        };
-        Ok(Errors { train, holdout: test })
+    let test = holdout.unwrap_or(&state.setup.test);
+    let tested = |model: &Model, residuals: &[Matrix]| match holdout {
+        Some(other) => {
+            on_another_record(model, other, true, &mut |_, _| true).map(|found| found.residuals)
+        }
+        None => Ok(residuals.to_vec()),
     };
-    let before = errors(measured, &base, &residuals_before)?;
-    let after = errors(mended, &model, &residuals_after)?;
+    let errors = |record: &Record, residuals: &[Matrix], tested: &[Matrix]| Errors {
+        train: SimulationError::of(record, residuals, false),
+        holdout: SimulationError::of(test, tested, false),
+    };
+    let before = errors(measured, &residuals_before, &tested(&base, &residuals_before)?);
+    let tested_after = tested(&model, &residuals_after)?;
+    let after = errors(mended, &residuals_after, &tested_after);
     let tests = residual::tests_of(&model, mended, &residuals_after)?;
     let noise: Vec<Effect> =
         noise::effects(&state, &residuals_after, &tests, &refinement.noise_floor)?
@@ -144,11 +154,25 @@ pub(super) fn summarise(
     rejected.extend(state.last.iter().cloned());
     rejected.extend(state.additions.iter().flat_map(|one| one.others.iter().cloned()));
     rejected.retain(|one| !effects.contains(&one.effect));
-    let verdict = verdict::verdict(&effects, &tests);
+    let fitted = fit_rivals(mended, holdout, means)?;
+    let is_structured = verdict::structured(&effects, &tests);
+    let situation = Situation {
+        record: mended,
+        residuals: &residuals_after,
+        over_noise: over_noise(&after, &refinement),
+        is_structured,
+        test: (test, &tested_after),
+        rivals: &fitted,
+    };
+    let answer = outside(&situation, &state.setup.policy.outside)?;
+    let verdict = verdict::verdict(is_structured, !answer.reasons.is_empty(), !effects.is_empty());
     let policy = &state.setup.policy.proposal;
     let next = verdict::next_experiment(&rejected, &effects, &tests, verdict, record, policy);
     Ok(Explanation {
         next_experiment: next,
+        rivals: fitted.iter().map(|rival| rival.scored(mended, Some(test))).collect(),
+        reasons: answer.reasons,
+        notes: answer.notes,
         held_out: mended.experiments().iter().map(|e| e.held_out.clone()).collect(),
         wrong_samples: state.wrong.clone(),
         warmups: mended.experiments().iter().map(|e| e.warmup).collect(),
@@ -168,6 +192,31 @@ pub(super) fn summarise(
         residuals_after,
         interrupted,
     })
+}
+
+/// The rivals of the model, fitted to a record whose outputs have lost their `means`.
+fn fit_rivals(
+    mended: &Record,
+    holdout: Option<&Record>,
+    means: &[f64],
+) -> Result<Vec<Fitted>, Error> {
+    let shifted = holdout.map(|other| {
+        let mut experiments = other.experiments().to_vec();
+        for experiment in &mut experiments {
+            for (mut column, mean) in experiment.output.column_iter_mut().zip(means) {
+                column.add_scalar_mut(-mean);
+            }
+        }
+        other.with_experiments(experiments)
+    });
+    rivals::fit(mended, shifted.transpose()?.as_ref(), &RivalPolicy::default())
+}
+
+/// The residual of the training data over the noise floor, all outputs together.
+fn over_noise(after: &Errors, refinement: &Refinement) -> f64 {
+    let floor = &refinement.noise_floor.rms;
+    let mean = floor.iter().map(|rms| rms * rms).sum::<f64>() / floor.len() as f64;
+    after.train.rms / mean.sqrt().max(f64::MIN_POSITIVE)
 }
 
 fn declared(before: &Errors) -> Step {

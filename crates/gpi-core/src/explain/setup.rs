@@ -1,6 +1,5 @@
 //! What never changes during a search.
 
-use super::blocks::complement;
 use super::policy::SearchPolicy;
 use crate::chain::point::Point;
 use crate::chain::table::Table;
@@ -53,7 +52,7 @@ impl SearchSetup {
         };
         Ok(Self {
             measured,
-            test: complement(&prepared.record)?,
+            test: prepared.record.held_out_part()?,
             options: options(&RefineOptions::default(), policy.fits.gain),
             moving_grids: options(&moving, policy.grid.gain),
             moving,

@@ -17,15 +17,18 @@ pub enum Verdict {
     PartlyExplained,
     /// The residual has structure, and no effect of the catalogue explains any of it.
     Unattributed,
+    /// The residual has structure because the declared structure is wrong, whatever effects were found.
+    OutsideClass,
 }
 
 impl Verdict {
-    /// The word for it: `explained`, `partly-explained` or `unattributed`.
+    /// The word for it: `explained`, `partly-explained`, `unattributed` or `outside-class`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Explained => "explained",
             Self::PartlyExplained => "partly-explained",
             Self::Unattributed => "unattributed",
+            Self::OutsideClass => "outside-class",
         }
     }
 }
@@ -64,12 +67,14 @@ pub fn structured(effects: &[&str], tests: &[ResidualTest]) -> bool {
     tests.iter().any(|test| !test.passed() && shows(test))
 }
 
-/// The verdict on a model with these effects, from the tests of its residual.
-pub(super) fn verdict(effects: &[&str], tests: &[ResidualTest]) -> Verdict {
-    match (structured(effects, tests), effects.is_empty()) {
-        (false, _) => Verdict::Explained,
-        (true, false) => Verdict::PartlyExplained,
-        (true, true) => Verdict::Unattributed,
+/// The verdict on a model: whether its residual is structured, whether the declared structure is wrong, and whether effects
+/// were found.
+pub(super) fn verdict(is_structured: bool, is_outside: bool, has_effects: bool) -> Verdict {
+    match (is_structured, is_outside, has_effects) {
+        (false, _, _) => Verdict::Explained,
+        (true, true, _) => Verdict::OutsideClass,
+        (true, false, true) => Verdict::PartlyExplained,
+        (true, false, false) => Verdict::Unattributed,
     }
 }
 
@@ -133,7 +138,8 @@ pub(super) fn next_experiment(
         let why = format!("{} and {with} explain the same here; {how}", one.effect);
         return Some(NextExperiment { why, command: command(kind) });
     }
-    if verdict == Verdict::Explained {
+    if matches!(verdict, Verdict::Explained | Verdict::OutsideClass) {
+        // no record makes a wrong structure right
         return None;
     }
     if is_one_sine(record) {
@@ -194,6 +200,15 @@ mod tests {
             next.command.starts_with("gpi excite triangle ")
                 && next.command.contains("--frequency")
         );
+    }
+
+    #[test]
+    fn a_wrong_structure_comes_before_effects_and_after_noise() {
+        assert_eq!(verdict(false, true, true), Verdict::Explained);
+        assert_eq!(verdict(true, true, true), Verdict::OutsideClass);
+        assert_eq!(verdict(true, true, false), Verdict::OutsideClass);
+        assert_eq!(verdict(true, false, true), Verdict::PartlyExplained);
+        assert_eq!(verdict(true, false, false), Verdict::Unattributed);
     }
 
     #[test]

@@ -149,6 +149,24 @@ impl Record {
         Ok((self.with_experiments(first)?, self.with_experiments(rest)?))
     }
 
+    /// The record in which what is held out is scored, and nothing else.
+    ///
+    /// # Errors
+    /// As for [`Record::new`]; an experiment holds nothing out.
+    pub(crate) fn held_out_part(&self) -> Result<Self, Error> {
+        let test = self.experiments.iter().map(|experiment| {
+            let mut test = experiment.clone();
+            test.warmup = experiment.held_out.first().map_or(0, |held| held.start);
+            let starts = experiment.held_out.iter().map(|held| held.end);
+            let rows = experiment.input.nrows();
+            let next = experiment.held_out.iter().skip(1).map(|held| held.start);
+            let gaps = starts.zip(next.chain(std::iter::once(rows)));
+            test.held_out = gaps.filter(|(a, b)| a < b).map(|(a, b)| a..b).collect();
+            test
+        });
+        self.with_experiments(test.collect())
+    }
+
     /// Rejects inputs and outputs that are constant.
     pub(crate) fn require_moving(&self) -> Result<(), Error> {
         let select: [fn(&Experiment) -> &Matrix; 2] = [|e| &e.input, |e| &e.output];

@@ -78,11 +78,33 @@ impl Explanation {
         rows::errors(py, &self.found.after)
     }
 
-    /// ``explained`` (the residual is noise), ``partly-explained`` (effects were found, but the residual is structured) or
-    /// ``unattributed`` (the residual is structured, and no effect was found).
+    /// ``explained`` (the residual is noise), ``partly-explained`` (effects were found, but the residual is structured),
+    /// ``unattributed`` (the residual is structured, and no effect was found) or ``outside-class`` (the residual is structured,
+    /// because the declared structure is wrong; see ``verdict_reason``).
     #[getter]
     fn verdict(&self) -> &'static str {
         self.found.verdict.name()
+    }
+
+    /// Why the declared structure is wrong, in words; None unless the verdict is ``outside-class``.
+    #[getter]
+    fn verdict_reason(&self) -> Option<String> {
+        let reasons = &self.found.reasons;
+        (!reasons.is_empty()).then(|| reasons.join("; "))
+    }
+
+    /// Sentences on the record that concern the estimate, such as an input that depends on the output.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.found.notes.clone()
+    }
+
+    /// Simple models that were fitted to the same training data, and scored on the same held-out data as ``after``.
+    ///
+    /// Rows as those of ``rivals``: ``name``, ``detail``, ``train_rms`` and ``holdout_rms`` (in the output's unit).
+    #[getter]
+    fn rivals<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        crate::rivals::rows(py, &self.found.rivals)
     }
 
     /// The steps of the search: the declared model, then each effect.

@@ -1,0 +1,122 @@
+//! Whether the input is computed from the output.
+//!
+//! Without feedback, past outputs contain nothing about the next input that past inputs do not contain: the output's own
+//! disturbances do not reach the input. The step of the input is predicted from its own past alone, and with past outputs
+//! (Granger 1969), on folds that neither regression was fitted to. With s and s_y the squares of the two, the statistics are
+//! the part `1 - s_y / s` that past outputs take, and the mean of the folds' differences over its standard error.
+//!
+//! On records of known truth a stage under feedback has the part 0.47, and fifty without at most 0.04.
+
+use crate::Record;
+use crate::explain::policy::OutsidePolicy;
+use crate::rivals::RivalPolicy;
+use crate::rivals::regression::{Features, Sums};
+
+/// Past inputs, then past outputs.
+struct Past<'a> {
+    record: &'a Record,
+    inputs: usize,
+    outputs: usize,
+}
+
+impl Past<'_> {
+    fn of_inputs(&self) -> usize {
+        self.inputs * self.record.inputs().len()
+    }
+}
+
+impl Features for Past<'_> {
+    fn count(&self) -> usize {
+        self.of_inputs() + self.outputs * self.record.outputs().len()
+    }
+
+    fn fill(&self, experiment: usize, k: usize, row: &mut [f64]) {
+        let experiment = &self.record.experiments()[experiment];
+        let mut values = row.iter_mut();
+        for (signal, lags) in [(&experiment.input, self.inputs), (&experiment.output, self.outputs)]
+        {
+            for column in signal.column_iter() {
+                for (value, lag) in values.by_ref().take(lags).zip(1..) {
+                    *value = column[k.saturating_sub(lag)];
+                }
+            }
+        }
+    }
+}
+
+/// The inputs that past outputs predict.
+pub(super) fn inputs(record: &Record, rivals: &RivalPolicy, policy: &OutsidePolicy) -> Vec<usize> {
+    let is_fed_back = |input: &usize| {
+        predicted(record, *input, rivals, policy)
+            .is_some_and(|(part, t)| part > policy.predicted && t > policy.sure)
+    };
+    (0..record.inputs().len()).filter(is_fed_back).collect()
+}
+
+/// The part of the squares that past outputs take, and how sure it is.
+fn predicted(
+    record: &Record,
+    input: usize,
+    rivals: &RivalPolicy,
+    policy: &OutsidePolicy,
+) -> Option<(f64, f64)> {
+    let features = Past { record, inputs: policy.past_inputs, outputs: policy.past_outputs };
+    let step = |experiment: usize, k: usize, values: &mut [f64]| {
+        let column = record.experiments()[experiment].input.column(input);
+        values[0] = column[k] - column[k.saturating_sub(1)];
+    };
+    let sums = Sums::of(&features, record, 1, step, rivals);
+    let own = sums.cross_validated(features.of_inputs(), 0.0)?;
+    let with = sums.cross_validated(features.count(), 0.0)?;
+    // an input that its own past determines is known without the output
+    if own.score() < policy.least_news * record.scored() as f64 {
+        return None;
+    }
+    let gains: Vec<f64> = own.squares.iter().zip(&with.squares).map(|(a, b)| a - b).collect();
+    let n = gains.len() as f64;
+    let mean = gains.iter().sum::<f64>() / n;
+    let variance = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    Some((1.0 - with.score() / own.score(), mean / (variance / n).sqrt().max(f64::MIN_POSITIVE)))
+}
+
+/// What it means for the estimate.
+pub(super) fn note(input: &str) -> String {
+    format!(
+        "Past outputs predict the input {input} beyond what its own past predicts. The input seems to depend on the output, as \
+         it does under feedback. The estimate is then biased: disturbances of the output return through the input, and \
+         are taken for its response. An experiment in open loop does not have this bias."
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::outside::plants::{noise, slow_input, stage};
+
+    #[test]
+    fn only_a_closed_loop_feeds_back() {
+        let (rivals, policy) = (RivalPolicy::default(), OutsidePolicy::default());
+        let reference = slow_input(6000);
+        let mut e = noise(4);
+        let disturbance: Vec<f64> = (0..6000).map(|_| 0.02 * e()).collect();
+        for (gain, expected) in [(0.0, vec![]), (2.0, vec![0])] {
+            let (mut u, mut y) = (vec![0.0], vec![0.0]);
+            for k in 1..6000 {
+                // a controller with a low gain that also lets the reference through
+                u.push(reference[k] + gain * (reference[k] - y[k - 1]));
+                y.push(0.8 * y[k - 1] + 0.2 * u[k - 1] + disturbance[k]);
+            }
+            assert_eq!(inputs(&stage(&u, &y), &rivals, &policy), expected, "gain {gain}");
+        }
+    }
+
+    #[test]
+    fn an_input_without_news_says_nothing() {
+        let u: Vec<f64> = (0..6000).map(|k| (0.01 * f64::from(k)).sin()).collect();
+        let mut e = noise(6);
+        let y: Vec<f64> = u.iter().map(|u| u + 0.1 * e()).collect();
+        let none: Vec<usize> = Vec::new();
+        let found = inputs(&stage(&u, &y), &RivalPolicy::default(), &OutsidePolicy::default());
+        assert_eq!(found, none);
+    }
+}

@@ -1,0 +1,96 @@
+//! Whether the declared structure itself is wrong.
+//!
+//! Each file asks one question about a record, and answers with a number or with nothing. An answer counts only where the
+//! residual of the final model is structured and above the noise: what is explained to the noise needs no other class. Signals
+//! are in the units of [`Units`], in which each input spans -1 to 1 and each output has the variance one.
+
+mod butterfly;
+mod feedback;
+mod integration;
+#[cfg(test)]
+mod plants;
+mod saturation;
+mod winner;
+
+use super::policy::OutsidePolicy;
+use crate::rivals::{Fitted, RivalPolicy, Units};
+use crate::{Error, Matrix, Record};
+
+/// What the questions are asked about.
+pub(super) struct Situation<'a> {
+    /// The training record.
+    pub record: &'a Record,
+    /// What the final model leaves of it, held-out samples included.
+    pub residuals: &'a [Matrix],
+    /// Root mean square of that over the noise floor.
+    pub over_noise: f64,
+    /// Whether the residual shows more than noise.
+    pub is_structured: bool,
+    /// What is held out, and what the final model leaves there.
+    pub test: (&'a Record, &'a [Matrix]),
+    /// The simple models.
+    pub rivals: &'a [Fitted],
+}
+
+/// Why the declared structure is wrong, and what else the reader has to know of the record.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Answer {
+    /// Clauses that can be joined; none where the structure may be right.
+    pub reasons: Vec<String>,
+    /// Sentences.
+    pub notes: Vec<String>,
+}
+
+/// Asks all questions.
+pub(super) fn outside(of: &Situation, policy: &OutsidePolicy) -> Result<Answer, Error> {
+    let rivals = RivalPolicy::default();
+    let scaled = Units::of(of.record).scaled(of.record)?;
+    let mut answer = Answer::default();
+    let fed_back = feedback::inputs(&scaled, &rivals, policy);
+    for &input in &fed_back {
+        answer.notes.push(feedback::note(&scaled.inputs()[input].name));
+    }
+    if !of.is_structured || of.over_noise < policy.near_noise {
+        return Ok(answer);
+    }
+    for (output, channel) in scaled.outputs().iter().enumerate() {
+        let name = &channel.name;
+        let ratio = integration::ratio(&scaled, output, &rivals, policy);
+        if let Some(ratio) = ratio.filter(|ratio| *ratio > policy.integrated) {
+            answer.reasons.push(format!(
+                "the output {name} integrates the input: with the running integrals of the input, a regression on \
+                 past inputs and plays leaves {ratio:.1} times smaller squares on data that it was not fitted to"
+            ));
+        }
+        let clipped = saturation::clipped(&scaled, output, policy);
+        if saturation::is_unexplained(&clipped, of.residuals, output) {
+            let share = 100.0 * clipped.share();
+            answer.reasons.push(format!(
+                "the output {name} saturates: {share:.1} % of its samples stand exactly at its largest or smallest \
+                 value while the input moves, and the model errs more there than elsewhere"
+            ));
+        }
+        for (input, drive) in scaled.inputs().iter().enumerate() {
+            if butterfly::is_butterfly(&scaled, input, output, policy) {
+                let drive = &drive.name;
+                answer.reasons.push(format!(
+                    "the loop of {name} over {drive} is a butterfly: the output falls at one end of the input's range \
+                     and rises at the other, and the loop crosses itself"
+                ));
+            }
+        }
+    }
+    if let Some(winner) = winner::winner(of.test, of.rivals, policy) {
+        let Fitted { name, detail, .. } = winner;
+        answer.reasons.push(format!(
+            "a simple model predicts held-out data better than this one: {name} ({detail})"
+        ));
+    }
+    for input in fed_back {
+        let name = &scaled.inputs()[input].name;
+        answer
+            .reasons
+            .push(format!("the input {name} depends on past outputs, as it does under feedback"));
+    }
+    Ok(answer)
+}
