@@ -4,6 +4,7 @@ use crate::effects::Effect;
 use crate::linear::StateSpace;
 use crate::operators::{Gpi, GpiState, Operator};
 use crate::simulation_error::SimulationError;
+use crate::uncertainty::Prediction;
 use crate::{Channel, Error, Matrix, Record};
 use nalgebra::DVector;
 
@@ -26,6 +27,8 @@ pub struct Model {
     offsets: Vec<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) effects: Vec<Effect>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) prediction: Option<Prediction>,
 }
 
 /// Everything a [`Model`] remembers between two samples.
@@ -61,7 +64,18 @@ impl Model {
     ) -> Result<Self, Error> {
         let schema = Self::SCHEMA.to_owned();
         let effects = Vec::new();
-        let model = Self { schema, rate, inputs, outputs, hysteresis, linear, offsets, effects };
+        let prediction = None;
+        let model = Self {
+            schema,
+            rate,
+            inputs,
+            outputs,
+            hysteresis,
+            linear,
+            offsets,
+            effects,
+            prediction,
+        };
         model.validate()?;
         Ok(model)
     }
@@ -73,6 +87,9 @@ impl Model {
         Error::require_equal("outputs", ("names", outputs), ("linear", self.linear.outputs()))?;
         Error::require_equal("outputs", ("names", outputs), ("offsets", self.offsets.len()))?;
         self.validate_effects()?;
+        if let Some(prediction) = &self.prediction {
+            prediction.validate(self.numbers().len(), outputs)?;
+        }
         if self.rate.is_finite() && self.rate > 0.0 {
             Ok(())
         } else {
@@ -108,6 +125,11 @@ impl Model {
     /// The constant term of each output, in its unit.
     pub fn offsets(&self) -> &[f64] {
         &self.offsets
+    }
+
+    /// What the model knows about the errors of its own simulations; `None` for a model that was not estimated.
+    pub fn prediction(&self) -> Option<&Prediction> {
+        self.prediction.as_ref()
     }
 
     /// The state of an actuator that was raised from zero to `input` (one value per input) once and

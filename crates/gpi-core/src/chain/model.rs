@@ -34,6 +34,8 @@ impl Model {
     /// An effect on a channel that the model does not have, or of another number of states.
     pub fn with_effects(mut self, effects: Vec<Effect>) -> Result<Self, Error> {
         self.effects = effects;
+        // it was that of other effects
+        self.prediction = None;
         self.validate_effects()?;
         Ok(self)
     }
@@ -41,6 +43,13 @@ impl Model {
     /// The effects, in the order of the chain.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
+    }
+
+    /// The model without the effects that the input does not drive.
+    pub(crate) fn driven(&self) -> Self {
+        let mut driven = self.clone();
+        driven.effects.retain(|effect| effect.entry().driven && !effect.is_added());
+        driven
     }
 
     /// What an engineer would call an effect's parameters, with the units of this model's channels.

@@ -103,16 +103,30 @@ impl Uncertainty {
         self.open.column_iter().map(direction).collect()
     }
 
-    /// Standard deviations of functions of the point, from central differences along the principal
-    /// axes of the covariance.
-    ///
-    /// `values` are those of the unknowns: a step stays far below them, also along an axis that is
-    /// unidentifiable.
+    /// Standard deviations of functions of the point: root of the sum of squares of [`Uncertainty::axes`].
     pub(crate) fn spread(
         &self,
         values_of: &[f64],
         moved: impl Fn(&DVector<f64>) -> Result<Vec<f64>, Error>,
     ) -> Result<Vec<f64>, Error> {
+        let mut variances: Vec<f64> = Vec::new();
+        for axis in self.axes(values_of, moved)? {
+            variances.resize(axis.len(), 0.0);
+            variances.iter_mut().zip(&axis).for_each(|(sum, change)| *sum += change.powi(2));
+        }
+        Ok(variances.into_iter().map(f64::sqrt).collect())
+    }
+
+    /// The change of functions of the point along each principal axis of the covariance, over one standard deviation: their
+    /// covariance is the sum of the outer products. From central differences.
+    ///
+    /// `values` are those of the unknowns: a step stays far below them, also along an axis that is
+    /// unidentifiable.
+    pub(crate) fn axes(
+        &self,
+        values_of: &[f64],
+        moved: impl Fn(&DVector<f64>) -> Result<Vec<f64>, Error>,
+    ) -> Result<Vec<Vec<f64>>, Error> {
         let CovarianceSettings { step: longest, part: most, least, axes, .. } = self.settings;
         let largest = values_of.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let reach = |value: f64| most * value.abs().max(least * largest);
@@ -124,8 +138,7 @@ impl Uncertainty {
         let correlation =
             Matrix::from_fn(n, n, |i, j| self.covariance[(i, j)] / (divisor[i] * divisor[j]));
         let (values, vectors) = descending_eigen(correlation);
-        let mut variances: Vec<f64> = Vec::new();
-        for (axis, &value) in values.iter().enumerate().take_while(|(_, value)| **value > axes) {
+        let along = |(axis, &value): (usize, &f64)| {
             let deviation = vectors.column(axis).component_mul(&scale) * value.sqrt();
             let parts = deviation.iter().zip(values_of);
             let fraction = parts
@@ -134,12 +147,10 @@ impl Uncertainty {
                 .fold(longest, f64::min);
             let step = deviation * fraction;
             let (above, below) = (moved(&step)?, moved(&-step)?);
-            variances.resize(above.len(), 0.0);
-            for (sum, (above, below)) in variances.iter_mut().zip(above.iter().zip(&below)) {
-                *sum += ((above - below) / (2.0 * fraction)).powi(2);
-            }
-        }
-        Ok(variances.into_iter().map(f64::sqrt).collect())
+            let change = |(above, below): (&f64, &f64)| (above - below) / (2.0 * fraction);
+            Ok(above.iter().zip(&below).map(change).collect())
+        };
+        values.iter().enumerate().take_while(|(_, value)| **value > axes).map(along).collect()
     }
 }
 

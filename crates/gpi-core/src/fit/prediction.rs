@@ -1,0 +1,74 @@
+//! What an estimated model knows about its errors: the axes of the covariance by the model's numbers, and its misfit.
+
+use super::misfit::Misfit;
+use super::refinement::Refinement;
+use crate::chain::point::Point;
+use crate::uncertainty::Prediction;
+use crate::{Error, Matrix, Model, Record};
+
+/// Axes shorter than this part of the longest are left out: the numbers of an axis are stored with 24 bits.
+const PRECISION: f64 = 1e-7;
+
+/// The uncertain numbers of a model and the axes of their covariance.
+fn axes_of(
+    model: &Model,
+    refinement: &Refinement,
+    record: &Record,
+) -> Result<(Vec<usize>, Vec<Vec<f32>>), Error> {
+    let bands = &refinement.bands;
+    let count = model.numbers().len();
+    // the means of the outputs do not change
+    let means = vec![0.0; model.outputs().len()];
+    let numbers = |point: &Point| {
+        let numbers = point.to_model(record, record, &means)?.numbers();
+        Error::require_equal("numbers", ("model", count), ("a near one", numbers.len()))?;
+        Ok(numbers)
+    };
+    let moved = bands.axes(numbers)?;
+    let uncertain: Vec<usize> =
+        (0..count).filter(|&i| moved.iter().any(|axis| axis[i] != 0.0)).collect();
+    let scale: Vec<f64> = uncertain
+        .iter()
+        .map(|&i| moved.iter().map(|axis| axis[i].powi(2)).sum::<f64>().sqrt())
+        .collect();
+    let scaled = Matrix::from_fn(uncertain.len(), moved.len(), |row, axis| {
+        moved[axis][uncertain[row]] / scale[row]
+    });
+    let found = scaled.svd(true, false);
+    let longest = found.singular_values.iter().copied().fold(0.0, f64::max);
+    let directions = found.u.unwrap_or_default();
+    let axes = directions
+        .column_iter()
+        .zip(found.singular_values.iter())
+        .filter(|(_, length)| **length > PRECISION * longest)
+        .map(|(axis, length)| {
+            axis.iter().zip(&scale).map(|(part, scale)| (part * length * scale) as f32).collect()
+        })
+        .collect();
+    Ok((uncertain, axes))
+}
+
+impl Model {
+    /// The model with what the [`Refinement`] that led to it on `record` knows about its errors; without it, where the
+    /// covariance cannot be expressed by the numbers of the model or is not finite.
+    ///
+    /// # Errors
+    /// A record of other channels than the model's, or one that the refinement did not see.
+    pub fn with_prediction(
+        mut self,
+        refinement: &Refinement,
+        record: &Record,
+    ) -> Result<Self, Error> {
+        let experiments = ("record", record.experiments().len());
+        let known = ("refinement", refinement.residuals.len());
+        Error::require_equal("experiments", experiments, known)?;
+        let (numbers, axes) = match axes_of(&self, refinement, record) {
+            Err(Error::Mismatch { .. }) => return Ok(self),
+            found => found?,
+        };
+        let Misfit { misfit, movement } = Misfit::of(&self, refinement, record)?;
+        let prediction = Prediction { numbers, axes, misfit, movement };
+        self.prediction = prediction.is_finite().then_some(prediction);
+        Ok(self)
+    }
+}
