@@ -174,9 +174,109 @@ impl Run<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::compensate::CompensateOptions;
+    use crate::linear::StateSpace;
+    use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
+    use crate::{Channel, Prediction};
+
+    /// `v = 1 u + 0.5 F_1(u)`, without dynamics.
+    fn model() -> Model {
+        let scalar = |value| Matrix::from_element(1, 1, value);
+        let none = Matrix::zeros(0, 0);
+        let (b, c) = (Matrix::zeros(0, 1), Matrix::zeros(1, 0));
+        let linear = StateSpace::new(none, b, c, scalar(1.0)).unwrap();
+        let envelope = Deadzones::new(vec![0.0], vec![1.0], Reading::OneSided).unwrap();
+        let gpi = Gpi::new(envelope, PlayBank::new(vec![0.0, 1.0], vec![1.0, 0.5]).unwrap());
+        let channel = |name| vec![Channel::new(name, "")];
+        Model::new(1e3, channel("u"), channel("y"), vec![gpi], linear, vec![0.0]).unwrap()
+    }
+
+    fn reference() -> Matrix {
+        Matrix::from_fn(400, 1, |k, _| 3.0 + 2.0 * (0.05 * k as f64).sin())
+    }
 
     #[test]
     fn usual_settings_are_valid() {
         ExpectationSettings::default().validate().unwrap();
+    }
+
+    #[test]
+    fn parts_that_are_not_known_are_named() {
+        let found = model().compensate(&reference(), &CompensateOptions::default()).unwrap();
+        assert_eq!(found.expected_error.missing(), ["parameters", "model"]);
+        assert_eq!(found.expected_error.parameters, None);
+    }
+
+    #[test]
+    fn parts_are_those_of_the_definitions() {
+        let mut model = model();
+        // the numbers: threshold, slope, half-widths, weights, D, offset; axes of the first weight and of the offset
+        let axes = vec![vec![0.01, 0.0], vec![0.0, 0.03]];
+        let (misfit, movement) = (vec![0.02], vec![0.5]);
+        let prediction = Prediction { numbers: vec![4, 7], axes, misfit, movement };
+        model.prediction = Some(prediction);
+        let options =
+            CompensateOptions { start: Some(Start::Input(vec![0.0])), ..Default::default() };
+        let reference = reference();
+        let found = model.compensate(&reference, &options).unwrap();
+        let expected = &found.expected_error;
+        let by_weight = 1e-4 * found.drive.norm_squared() / 400.0;
+        let parameters = (by_weight + 9e-4).sqrt();
+        assert!((expected.parameters.unwrap() / parameters - 1.0).abs() < 1e-6);
+        let misfit = 2.0 * 0.02 * reference.column(0).variance().sqrt() / 0.5;
+        assert!((expected.model.unwrap() / misfit - 1.0).abs() < 1e-12);
+        assert_eq!(expected.past, 0.0);
+        let rms = (parameters.powi(2) + misfit.powi(2)).sqrt();
+        assert!((expected.rms / rms - 1.0).abs() < 1e-6);
+        assert!(expected.bound > 2.0 * expected.rms);
+    }
+
+    #[test]
+    fn the_past_is_unknown_until_the_plays_are_swept() {
+        let start = |start: Start| CompensateOptions { start: Some(start), ..Default::default() };
+        let past = |options: &CompensateOptions, reference: &Matrix| {
+            model().compensate(reference, options).unwrap().expected_error.past
+        };
+        let input = start(Start::Input(vec![2.0]));
+        let swept = past(&input, &reference());
+        let still = past(&input, &Matrix::from_element(400, 1, 2.5));
+        assert!(still > 0.2 && swept > 0.0 && swept < 0.5 * still, "{still} {swept}");
+        // at rest at 2, F is between 1 and 3, so the output between 2.5 and 3.5
+        let output = start(Start::Output { input: 2.0, output: 2.7 });
+        assert!(past(&output, &Matrix::from_element(400, 1, 2.7)) < 1e-6);
+        let state = start(Start::State { input: vec![2.0], state: model().start(&[2.0]).unwrap() });
+        assert_eq!(past(&state, &reference()), 0.0);
+    }
+
+    #[test]
+    fn a_start_is_where_the_drive_goes_on() {
+        let asked = |output: f64| CompensateOptions {
+            start: Some(Start::Output { input: 2.0, output }),
+            ..CompensateOptions::default()
+        };
+        let reference = Matrix::from_fn(200, 1, |k, _| 3.2 + 0.01 * k as f64);
+        let found = model().compensate(&reference, &asked(3.2)).unwrap();
+        assert!((found.drive[0] - 2.0).abs() < 1e-9 && found.error.max < 1e-9);
+        // the play stands at 2.4: it moves from u = 3.4 on, at y = 4.6
+        assert!((found.drive[100] - 3.0).abs() < 1e-9);
+        let refused = model().compensate(&reference, &asked(3.6)).unwrap_err().to_string();
+        assert!(refused.contains("start_output") && refused.contains("3.5"), "{refused}");
+    }
+
+    #[test]
+    fn backlash_is_jumped_across() {
+        let mut model = model();
+        let plays = PlayBank::new(vec![0.0, 0.3, 1.0], vec![0.0, 1.0, 0.5]).unwrap();
+        let gpi = Gpi::new(model.hysteresis()[0].envelope().clone(), plays);
+        let (inputs, outputs) = (model.inputs().to_vec(), model.outputs().to_vec());
+        let linear = model.linear().clone();
+        model = Model::new(1e3, inputs, outputs, vec![gpi], linear, vec![0.0]).unwrap();
+        let found = model.compensate(&reference(), &CompensateOptions::default()).unwrap();
+        assert!(found.error.rms < 1e-5, "{:?} {:?}", found.error, found.passes);
+        let most =
+            (1..400).map(|k| (found.drive[k] - found.drive[k - 1]).abs()).fold(0.0, f64::max);
+        assert!((0.55..0.75).contains(&most), "{most}");
+        let refused = model.compensator((-10.0, 10.0)).unwrap_err().to_string();
+        assert!(refused.contains("backlash") && refused.contains("0.3"), "{refused}");
     }
 }

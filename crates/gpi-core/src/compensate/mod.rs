@@ -69,7 +69,7 @@ impl Model {
         let driven = self.driven();
         driven.require_reference(reference)?;
         let limits = driven.limits(&options.limits)?;
-        options.start.iter().try_for_each(|start| start.validate(self))?;
+        options.start.iter().try_for_each(|start| start.validate(&driven))?;
         let requirement = "the largest slope of the drive must be positive";
         Error::require(options.slew > 0.0, "slew", options.slew, requirement)?;
         let known = if options.quasi_static { driven.quasi_static()? } else { driven.clone() };
