@@ -4,6 +4,7 @@ use super::misfit::Misfit;
 use super::refinement::Refinement;
 use crate::chain::point::Point;
 use crate::uncertainty::Prediction;
+use crate::uncertainty::covariance::descending_eigen;
 use crate::{Error, Matrix, Model, Record};
 
 /// Axes shorter than this part of the longest are left out: the numbers of an axis are stored with 24 bits.
@@ -31,19 +32,17 @@ fn axes_of(
         .iter()
         .map(|&i| moved.iter().map(|axis| axis[i].powi(2)).sum::<f64>().sqrt())
         .collect();
-    let scaled = Matrix::from_fn(uncertain.len(), moved.len(), |row, axis| {
-        moved[axis][uncertain[row]] / scale[row]
-    });
-    let found = scaled.svd(true, false);
-    let longest = found.singular_values.iter().copied().fold(0.0, f64::max);
-    let directions = found.u.unwrap_or_default();
-    let axes = directions
+    let all =
+        Matrix::from_fn(uncertain.len(), moved.len(), |row, axis| moved[axis][uncertain[row]]);
+    let scaled = Matrix::from_fn(all.nrows(), all.ncols(), |i, k| all[(i, k)] / scale[i]);
+    // turned to principal axes: no more of them than numbers are long
+    let (lengths, turned) = descending_eigen(scaled.tr_mul(&scaled));
+    let least = PRECISION.powi(2) * lengths.iter().copied().fold(0.0, f64::max);
+    let axes = (all * turned)
         .column_iter()
-        .zip(found.singular_values.iter())
-        .filter(|(_, length)| **length > PRECISION * longest)
-        .map(|(axis, length)| {
-            axis.iter().zip(&scale).map(|(part, scale)| (part * length * scale) as f32).collect()
-        })
+        .zip(lengths.iter())
+        .filter(|(_, length)| **length > least)
+        .map(|(axis, _)| axis.iter().map(|&part| part as f32).collect())
         .collect();
     Ok((uncertain, axes))
 }
