@@ -51,6 +51,23 @@ impl Model {
     /// The model with what the [`Refinement`] that led to it on `record` knows about its errors; without it, where the
     /// covariance cannot be expressed by the numbers of the model or is not finite.
     ///
+    /// ```
+    /// use gpi_core::identify::{Grid, IdentifyOptions, identify};
+    /// use gpi_core::{Channel, Experiment, Matrix, Record};
+    /// let u = Matrix::from_fn(2000, 1, |k, _| if k < 20 { 0.0 } else { (0.02 * k as f64 + 1e-5 * (k * k) as f64).sin() });
+    /// let y = Matrix::from_fn(2000, 1, |k, _| 2.0 * u[k] + 1e-3 * (7.0 * k as f64).cos());
+    /// let channel = |name| vec![Channel::new(name, "")];
+    /// let record = Record::new(vec![Experiment::new(u, y)], 1e3, channel("u"), channel("y"), vec![])?;
+    /// let grid = Some(Grid::Count(0));
+    /// let options = IdentifyOptions {
+    ///     delay: Some(0), half_widths: grid.clone(), thresholds: grid, ..IdentifyOptions::default()
+    /// };
+    /// let found = identify(&record, &options, &mut |_, _| true)?;
+    /// let model = found.model.with_prediction(&found.refinement, &record)?;
+    /// assert!(model.prediction().is_some());
+    /// # Ok::<(), gpi_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// A record of other channels than the model's, or one that the refinement did not see.
     pub fn with_prediction(
