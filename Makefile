@@ -19,7 +19,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # `make test` always runs its checks in the same order, also with `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking firmware-cost scoreboard blind-exam clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost scoreboard blind-exam clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -89,6 +89,9 @@ monte-carlo: $(NATIVE) ## Print errors over the Cramer-Rao bound and the coverag
 
 tracking: $(NATIVE) ## Measure how well compensated drives work on a changed plant and write docs/tracking.md
 	$(BIN)/python tools/tracking.py --markdown docs/tracking.md
+
+expected-errors: $(NATIVE) ## Print the error that compensate expects beside the error that simulated stages make
+	$(BIN)/python tools/expected_errors.py
 
 firmware-cost: $(NATIVE) ## Count a compensator's instructions on a Cortex-M4F in QEMU and write docs/firmware.md
 	$(BIN)/python tools/firmware_cost.py --markdown docs/firmware.md

@@ -1,10 +1,11 @@
 """Measure how well a compensated drive works if the stage has changed since the identification.
 
 A stage of the tests' simulator is identified. Then every parameter of it is changed by up to 5 %, and it gets
-creep and one more mode. It has to follow a triangle of decreasing amplitude. Four drives are compared: a
-drive that is proportional to the reference, and the drives of three models. These models are that of the
-stage before the change, a model that is identified again, and the model of `explain` from a record of the
-changed stage. `--markdown` writes docs/tracking.md.
+creep and one more mode. It has to follow a triangle of decreasing amplitude. Four drives are compared: the
+best static curve from the reference to the drive, and the drives of three models. These models are that of
+the stage before the change, a model that is identified again, and the model of `explain` from a record of the
+changed stage. A second table compares the error that `compensate` expects with the error that a stage makes,
+see tools/expected_errors.py. `--markdown` writes docs/tracking.md.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "tests"))
 
+import expected_errors  # noqa: E402
 import gpi_hammerstein as gpi  # noqa: E402
 import plants  # noqa: E402  the simulator that the tests use
 from gpi_hammerstein.files import write_atomically  # noqa: E402
@@ -27,7 +29,7 @@ LACKS = ("creep", "linear-dynamics")
 STRENGTH = 10.0
 REST, APPROACH = 0.1, 0.3  # seconds before the triangle
 LOW, HIGH = 0.2, 0.8  # of the stage's travel
-DRIVES = ("in proportion", "as it was", "identified anew", "after `explain`")
+DRIVES = ("static curve", "as it was", "identified anew", "after `explain`")
 HEAD = ["stage", *DRIVES, "gain", "explained by the change", "noise"]
 TEXT = """# Tracking
 
@@ -43,17 +45,29 @@ reference, without the noise of the sensor:
 
 The columns are:
 
-- `in proportion`: the drive is proportional to the reference. It is the straight line that fits the drive
-  of the next column best.
+- `static curve`: the drive is a static curve of the reference. It is the polynomial of degree {degree} that
+  fits the drive of the next column best.
 - `as it was`: the drive is computed by `model.compensate` with a model of the stage before the change.
 - `identified anew`: the model was identified by `identify` from one record of the changed stage.
 - `after explain`: the model was found by `explain` from the same record.
-- `gain`: the error of `in proportion` divided by the error of `after explain`.
+- `gain`: the error of `static curve` divided by the error of `after explain`.
 - `explained by the change`: the share of the error of `as it was`, in per cent of its power, that is caused
   by the difference between the two stages under this drive.
 - `noise`: the rms of the sensor noise, in per cent of the span of the reference.
+
+## The expected error
+
+A stage is identified from one record of {seconds:g} s, and the saved model computes the drive for a new
+random path from rest. `made` is the rms error of the true output, without the noise of the sensor, and
+`expected` the rms error that `compensate` has predicted before, with its parts; all in per cent of the span
+of the reference. The expected error is within a factor of {factor:g} of the error that was made on
+**{within} of {count}** stages. On as many stages with creep (of {strength:g} times the noise), which the
+model does not contain, it is on {lacking} of {count}.
+
+{expected}
 """
 TURNS = 6
+DEGREE = 5
 
 
 def changed(plant: plants.Plant, seed: int) -> plants.Plant:
@@ -126,7 +140,7 @@ def track(seed: int) -> list[float]:
         return float(100 * np.sqrt(np.mean(error**2)) / span)
 
     old = gpi.identify(record).compensate(wanted, limits=limits)
-    line = np.polyval(np.polyfit(wanted, old.drive[old.lead :], 1), wanted)
+    line = np.polyval(np.polyfit(wanted, old.drive[old.lead :], DEGREE), wanted)
     errors = [rms(missed(after, line, 0)), rms(missed(after, old.drive, old.lead))]
     for model in (gpi.identify(anew), gpi.explain(anew).model):
         found = model.compensate(wanted, limits=limits)
@@ -141,6 +155,7 @@ def main() -> None:
     """Run all stages, and print or write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--stages", type=int, default=8, help="number of simulated stages")
+    parser.add_argument("--expected", type=int, default=40, help="number of stages of the second table")
     parser.add_argument(
         "--markdown", type=Path, help="file to write the page to, for example docs/tracking.md"
     )
@@ -152,11 +167,19 @@ def main() -> None:
     texts = [[str(seed), *(f"{value:.3g}" for value in row)] for seed, row in enumerate(rows)]
     texts.append(["median", *(f"{value:.3g}" for value in np.median(rows, axis=0))])
     lines = [HEAD, ["---"] * len(HEAD), *texts]
+    found = expected_errors.study(arguments.expected, ())
+    lacking = expected_errors.study(arguments.expected, ("creep",))
     page = TEXT.format(
         seconds=SECONDS,
         perturbation=PERTURBATION,
         strength=STRENGTH,
         turns=TURNS,
+        degree=DEGREE,
+        factor=expected_errors.FACTOR,
+        within=expected_errors.within(found),
+        lacking=expected_errors.within(lacking),
+        count=len(found),
+        expected=expected_errors.table(found),
         table="\n".join(f"| {' | '.join(line)} |" for line in lines),
     )
     if arguments.markdown is None:

@@ -39,7 +39,7 @@ def test_the_declared_model_follows_exactly():
     wanted = reference()
     found = model_of(plant()).compensate(wanted)
     assert np.max(np.abs(reached(found) - wanted)) < 1e-11
-    assert found.error["max"] < 1e-11 and found.error_in_proportion["max"] > 0.1
+    assert found.error["max"] < 1e-11 and found.error_static_curve["max"] > 0.1
     assert found.out_of_reach == found.too_fast == 0
     assert (found.compensated, found.left) == ([], [])
     np.testing.assert_array_equal(found.reference[found.lead :], wanted)
@@ -90,7 +90,7 @@ def test_dynamics_left_alone():
     still = 0.7 + model.linear.dc_gain[0, 0] * model.intermediate(found.drive).ravel()
     assert np.max(np.abs(still - smooth)) < 1e-12
     # what is left is what G takes to get there
-    assert np.max(np.abs(chain(found.drive) - smooth)) < 0.1 * found.error_in_proportion["max"]
+    assert np.max(np.abs(chain(found.drive) - smooth)) < 0.1 * found.error_static_curve["max"]
 
 
 def test_within_limits_and_speed():
@@ -122,6 +122,12 @@ def test_any_path_is_followed(seed, size):
         ({"slew": 0.0}, gpi.ParameterError, "`slew` = 0"),
         ({"slew": float("nan")}, gpi.ParameterError, "`slew` = NaN"),
         ({"reference": [0.0, np.nan]}, gpi.DataError, "has 1 NaN or infinite samples, the first in row 1"),
+        ({"start": [0.0, 1.0]}, gpi.DataError, "`start` has 2 inputs, but `model` has 1"),
+        ({"start": float("nan")}, gpi.ParameterError, "`start` = [NaN]"),
+        ({"start_output": 1.0}, gpi.ParameterError, "`start_output` needs `start`"),
+        ({"start": 0.5, "start_output": 99.0}, gpi.ParameterError, "`start_output` = 99"),
+        ({"start": 0.5, "start_state": [1.0]}, gpi.ParameterError, "`state` has 1 elements"),
+        ({"start": 0.5, "start_state": [1.0], "start_output": 0.0}, gpi.ParameterError, "exclude each other"),
         ({"reference": []}, gpi.DataError, "0 usable samples"),
         ({"reference": np.zeros((5, 2))}, gpi.DataError, "`reference` has 2 outputs, but `model` has 1"),
     ],
@@ -130,6 +136,63 @@ def test_wrong_calls_are_named(arguments, error, message):
     with pytest.raises(error) as told:
         model_of(plant()).compensate(**({"reference": reference()} | arguments))
     assert message in str(told.value)
+
+
+@pytest.fixture(scope="module")
+def estimated():
+    """A model of the oracle's plant that was identified from noisy data."""
+    random = np.random.default_rng(5)
+    u = gpi.multisine(6000, RATE, (0.5, 0.3 * RATE), (-2.0, 2.0), seed=1)
+    u = np.concatenate([np.zeros(200), u - u[0] * np.linspace(1, 0, len(u)) ** 50])
+    y = chain(u) + random.normal(0.0, 0.01, len(u))
+    return gpi.identify(gpi.Record(u, y, RATE))
+
+
+def test_the_expected_error_is_in_the_model_file(estimated):
+    wanted = reference()
+    found = estimated.compensate(wanted, start=0.0)
+    expected = found.expected_error
+    parts = expected["parts"]
+    assert expected["missing"] == [] and parts["past"] == 0.0
+    assert parts["parameters"] > 1e-4 and found.error["rms"] == pytest.approx(parts["inversion"])
+    assert expected["rms"] == pytest.approx(np.sqrt(sum(part**2 for part in parts.values())))
+    made = np.sqrt(np.mean((reached(found) - wanted) ** 2))
+    assert 0.3 < expected["rms"] / made < 3.0
+    assert np.max(np.abs(reached(found) - wanted)) < 2 * expected["bound"]
+    again = gpi.Model.from_json(estimated.to_json()).compensate(wanted, start=0.0)
+    assert again.expected_error == expected
+
+
+def test_a_changed_model_knows_less(estimated):
+    text = json.loads(estimated.to_json())
+    del text["prediction"]
+    found = gpi.Model.from_json(json.dumps(text)).compensate(reference())
+    assert found.expected_error["missing"] == ["parameters", "model"]
+    assert found.expected_error["parts"]["model"] is None
+    text = json.loads(estimated.to_json())
+    text["prediction"]["numbers"][0] = 10_000
+    with pytest.raises(gpi.GpiError, match="prediction.numbers"):
+        gpi.Model.from_json(json.dumps(text))
+
+
+def test_the_past_decays_where_the_plays_are_swept(estimated):
+    model = model_of(plant())
+    path = model.compensate(reference())
+    still = model.compensate(np.full(SAMPLES, 0.7))
+    assert 0 < path.expected_error["parts"]["past"] < still.expected_error["parts"]["past"]
+    state = model.start([0.4])
+    known = model.compensate(reference(), start=0.4, start_state=state)
+    assert known.expected_error["parts"]["past"] == 0.0
+    u, _ = model.run(known.drive, state)
+    np.testing.assert_allclose(u, known.predicted, rtol=0, atol=1e-12)
+
+
+def test_the_static_curve_is_better_than_a_line():
+    wanted = reference()
+    found = model_of(plant()).compensate(wanted)
+    line = np.polyval(np.polyfit(found.reference, found.drive, 1), found.reference)
+    missed = chain(line)[found.lead :] - wanted
+    assert found.error_static_curve["rms"] < np.sqrt(np.mean(missed**2))
 
 
 def write(path, column="y_um", rate=RATE):
@@ -149,9 +212,9 @@ def test_the_command_writes_a_drive_that_works(saved, tmp_path, capsys):
     assert cli.run(["compensate", saved, str(path), "-o", str(tmp_path / "out"), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert result["schema"] == "gpi-compensation/1" and result["out_of_reach"] == 0
-    assert result["error"]["predicted"]["max"] < 1e-11 < 0.1 < result["error"]["in_proportion"]["max"]
+    assert result["error"]["inversion"]["max"] < 1e-11 < 0.1 < result["error"]["static_curve"]["max"]
     table = pl.read_csv(tmp_path / "out" / "drive.csv")
-    assert table.columns == ["t", "u", "reference_y", "predicted_y", "in_proportion_y"]
+    assert table.columns == ["t", "u", "reference_y", "predicted_y", "static_curve_y"]
     assert (
         np.max(np.abs(chain(table["u"].to_numpy()) - table["reference_y"].to_numpy())[table["t"] >= 0])
         < 1e-11
@@ -168,7 +231,13 @@ def test_the_command_speaks(saved, tmp_path, capsys):
         cli.run(["compensate", saved, str(path), "-r", "wanted", "--limits", "-0.5,0.5", "--slew", "5"]) == 0
     )
     said = capsys.readouterr().out
-    assert "Predicted error" in said and "are at a limit" in said and "slope of the drive is limited" in said
+    assert "Expected error" in said and "are at a limit" in said and "slope of the drive is limited" in said
+    assert "parameters and model are missing" in " ".join(said.split())
+    assert cli.run(["compensate", saved, str(path), "-r", "wanted", "--start", "0", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["expected_error"]["parts"]["past"] == 0.0
+    asked = ["--start", "0.5", "--start-output", "99"]
+    assert cli.run(["compensate", saved, str(path), "-r", "wanted", *asked]) == 2
+    assert "start_output" in capsys.readouterr().err
     assert cli.run(["compensate", saved, str(path), "-r", "wanted", "--limits", "5"]) == 2
     assert "such as -10,150" in capsys.readouterr().err
     other = write(tmp_path / "slow.csv", rate=500.0)

@@ -70,6 +70,8 @@ pub use progress::Progress;
 pub use record::{Channel, Experiment, Record, TimeAxis};
 #[cfg(feature = "identify")]
 pub use simulation_error::SimulationError;
+#[cfg(feature = "identify")]
+pub use uncertainty::Prediction;
 
 /// A dense matrix of `f64`, stored by columns; signals are (samples, channels).
 #[cfg(feature = "identify")]

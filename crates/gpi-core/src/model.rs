@@ -5,6 +5,7 @@ use crate::estimates::Estimates;
 use crate::linear::StateSpace;
 use crate::operators::{Gpi, GpiState, Operator};
 use crate::simulation_error::SimulationError;
+use crate::uncertainty::Prediction;
 use crate::{Channel, Error, Matrix, Record};
 use nalgebra::DVector;
 
@@ -29,6 +30,8 @@ pub struct Model {
     pub(crate) effects: Vec<Effect>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) estimates: Option<Estimates>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) prediction: Option<Prediction>,
 }
 
 /// Everything a [`Model`] remembers between two samples.
@@ -63,9 +66,20 @@ impl Model {
         offsets: Vec<f64>,
     ) -> Result<Self, Error> {
         let schema = Self::SCHEMA.to_owned();
-        let (effects, estimates) = (Vec::new(), None);
-        let model =
-            Self { schema, rate, inputs, outputs, hysteresis, linear, offsets, effects, estimates };
+        let effects = Vec::new();
+        let (estimates, prediction) = (None, None);
+        let model = Self {
+            schema,
+            rate,
+            inputs,
+            outputs,
+            hysteresis,
+            linear,
+            offsets,
+            effects,
+            estimates,
+            prediction,
+        };
         model.validate()?;
         Ok(model)
     }
@@ -77,6 +91,9 @@ impl Model {
         Error::require_equal("outputs", ("names", outputs), ("linear", self.linear.outputs()))?;
         Error::require_equal("outputs", ("names", outputs), ("offsets", self.offsets.len()))?;
         self.validate_effects()?;
+        if let Some(prediction) = &self.prediction {
+            prediction.validate(self.numbers().len(), outputs)?;
+        }
         if self.rate.is_finite() && self.rate > 0.0 {
             Ok(())
         } else {
@@ -123,6 +140,11 @@ impl Model {
     #[must_use]
     pub fn with_estimates(self, estimates: Estimates) -> Self {
         Self { estimates: Some(estimates), ..self }
+    }
+
+    /// What the model knows about the errors of its own simulations; `None` for a model that was not estimated.
+    pub fn prediction(&self) -> Option<&Prediction> {
+        self.prediction.as_ref()
     }
 
     /// The state of an actuator that was raised from zero to `input` (one value per input) once and

@@ -7,13 +7,13 @@ import numpy as np
 import polars as pl
 import typer
 from rich.markup import escape
+from rich.table import Table
 
 from gpi_hammerstein import files
 from gpi_hammerstein._native import Compensation, DataError, Model, ParameterError
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import (
     console,
-    error_table,
     picture,
     print_json,
     say_written,
@@ -55,6 +55,21 @@ Preview = Annotated[
         help="Time by which the drive may begin before the reference. Default: as long as the dynamics need.",
     ),
 ]
+Start = Annotated[
+    list[float] | None,
+    typer.Option(
+        metavar="INPUT",
+        help="Input at which the stage rests before the drive begins, once for each input; at 0, its plays "
+        "are at rest. Default: the first value of the drive, and an unknown past.",
+    ),
+]
+StartOutput = Annotated[
+    float | None,
+    typer.Option(
+        metavar="OUTPUT",
+        help="Output that is measured while the stage rests at --start; it tells a part of the past.",
+    ),
+]
 Passes = Annotated[int, typer.Option(min=0, help="Largest number of iterations after the first pass.")]
 
 WRITTEN = ["drive.csv", "compensation.json", "compensation.png"]
@@ -72,6 +87,8 @@ def compensate(
     quasi_static: QuasiStatic = False,
     preview: Preview = None,
     passes: Passes = 20,
+    start: Start = None,
+    start_output: StartOutput = None,
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
@@ -96,6 +113,8 @@ def compensate(
             quasi_static=quasi_static,
             preview=None if preview is None else round(preview * model.rate),
             passes=passes,
+            start=start or None,
+            start_output=start_output,
         )
     result: dict[str, Any] = {
         "schema": "gpi-compensation/1",
@@ -113,7 +132,9 @@ def compensate(
             }
             for name, unit, u in zip(model.input_names, model.input_units, columns(found.drive), strict=True)
         },
-        "error": {"predicted": found.error, "in_proportion": found.error_in_proportion},
+        "start": None if not start else {"input": start, "output": start_output},
+        "expected_error": found.expected_error,
+        "error": {"inversion": found.error, "static_curve": found.error_static_curve},
         "passes": found.passes,
         "out_of_reach": found.out_of_reach,
         "too_fast": found.too_fast,
@@ -133,8 +154,8 @@ def compensate(
         return
     screen = console()
     unit = model.output_units[0] if len(set(model.output_units)) == 1 else ""
-    rows = {"proportional drive": found.error_in_proportion, "compensated": found.error}
-    screen.print(error_table(rows, unit, "Predicted error, without the error of the model itself"))
+    screen.print(expected_table(found, unit))
+    screen.print(expected_sentence(found, unit))
     for name, row in result["drive"].items():
         screen.print(
             f"The range of {name} is {row['lowest']:.4g} to {row['highest']:.4g} {row['unit']}, and its "
@@ -143,7 +164,7 @@ def compensate(
         )
     for effect, why in found.left:
         screen.print(
-            f"[yellow]not compensated[/] {effect}: {escape(why)}. The predicted error does not contain it."
+            f"[yellow]not compensated[/] {effect}: {escape(why)}. The expected error does not contain it."
         )
     if found.lead:
         screen.print(f"The drive begins {found.lead / model.rate:.4g} s before the reference.")
@@ -152,6 +173,44 @@ def compensate(
     if found.too_fast:
         screen.print(f"[yellow]too fast[/] the slope of the drive is limited at {found.too_fast} samples.")
     say_written(screen, out, WRITTEN)
+
+
+PARTS = {
+    "inversion": "inversion: what the limits and the passes leave",
+    "parameters": "parameters: their covariance under this drive",
+    "model": "model: what its structure leaves",
+    "past": "past: the unknown state before the drive begins",
+}
+
+
+def expected_table(found: Compensation, unit: str) -> Table:
+    """Return the table of the expected error and its parts."""
+    expected = found.expected_error
+    table = Table(title="Expected error of the stage, without the noise of the sensor")
+    table.add_column("part")
+    table.add_column("rms" + (f" / {unit}" if unit else ""), justify="right")
+    for name, what in PARTS.items():
+        part = expected["parts"][name]
+        table.add_row(what, "not known" if part is None else f"{part:.4g}")
+    table.add_section()
+    table.add_row("compensated drive", ("> " if expected["missing"] else "") + f"{expected['rms']:.4g}")
+    table.add_row("best static curve, without these parts", f"{found.error_static_curve['rms']:.4g}")
+    return table
+
+
+def expected_sentence(found: Compensation, unit: str) -> str:
+    """Return the expected error in one sentence."""
+    expected = found.expected_error
+    rms, bound = (f"{expected[name]:.3g} {unit}".rstrip() for name in ("rms", "bound"))
+    text = (
+        f"The stage is expected to miss the reference by {rms} rms. At the worst sample, the error is below "
+    )
+    text += f"{bound} with a probability of 95 %"
+    if expected["missing"]:
+        missing = " and ".join(expected["missing"])
+        text += f"; the parts {missing} are missing, because the model file has no `prediction`: "
+        text += "identify the model again"
+    return text + "."
 
 
 def read_reference(
@@ -232,7 +291,7 @@ def drive_table(model: Model, found: Compensation) -> pl.DataFrame:
     signals = {
         "reference": found.reference,
         "predicted": found.predicted,
-        "in_proportion": found.in_proportion,
+        "static_curve": found.static_curve,
     }
     for what, signal in signals.items():
         for name, values in zip(model.output_names, columns(signal), strict=True):

@@ -8,9 +8,10 @@ from gpi_hammerstein.plot.style import BLUE, VERMILION, axes, label
 
 
 def compensation(found: Compensation, ax: Axes | None = None) -> Axes:
-    """Draw the predicted output over the reference, for a proportional drive and for the compensated drive.
+    """Draw the predicted output over the reference, for the best static curve and for the compensated drive.
 
-    A proportional drive shows the hysteresis loop. For a perfect compensation, the curve is a straight line.
+    The drive of a static curve shows the hysteresis loop. For a perfect compensation, the plot is a straight
+    line.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def compensation(found: Compensation, ax: Axes | None = None) -> Axes:
 
     reference = first(found.reference)
     for signal, error, color, what in (
-        (found.in_proportion, found.error_in_proportion, BLUE, "proportional drive"),
+        (found.static_curve, found.error_static_curve, BLUE, "static curve"),
         (found.predicted, found.error, VERMILION, "compensated drive"),
     ):
         fit = f"{what}, {100 * error['nrmse']:.2g} % rms"

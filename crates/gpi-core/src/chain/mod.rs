@@ -67,6 +67,7 @@ mod loops;
 mod model;
 mod motion;
 mod names;
+mod numbers;
 mod placement;
 mod plays;
 pub(crate) mod point;

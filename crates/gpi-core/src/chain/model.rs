@@ -49,6 +49,7 @@ impl Model {
         self.effects = effects;
         // they belong to the model with its own effects
         self.estimates = None;
+        self.prediction = None;
         self.validate_effects()?;
         Ok(self)
     }
@@ -57,6 +58,13 @@ impl Model {
     /// this order; the places themselves have a fixed order.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
+    }
+
+    /// The model without the effects that the input does not drive.
+    pub(crate) fn driven(&self) -> Self {
+        let mut driven = self.clone();
+        driven.effects.retain(|effect| effect.entry().driven && !effect.is_added());
+        driven
     }
 
     /// Rejects covariates that lack a measured column which an effect is made of; `names` are those of the columns that

@@ -30,18 +30,23 @@ pub(super) fn advance(model: &Model, drive: &mut Matrix) {
     }
 }
 
-/// Limits the slope of each drive to `slew` (per second) and to the limits of its effects; returns the number of clamped
-/// samples.
-pub(super) fn slow_down(model: &Model, drive: &mut Matrix, slew: f64) -> usize {
+/// Limits the slope of each drive to `slew` (per second) and to the limits of its effects, from the input `at_rest` on
+/// where it is known; returns the number of clamped samples.
+pub(super) fn slow_down(
+    model: &Model,
+    drive: &mut Matrix,
+    slew: f64,
+    at_rest: Option<&[f64]>,
+) -> usize {
     let mut too_fast = 0;
     for (input, mut column) in drive.column_iter_mut().enumerate() {
         let own = effects(model).filter(|effect| effect.input() == input);
         let most = own.map(InputStage::fastest).fold(slew, f64::min) / model.rate();
-        for k in 1..column.len() {
-            let before = column[k - 1];
+        let mut before = at_rest.map_or(column[0], |values| values[input]);
+        for k in 0..column.len() {
             let value = column[k].clamp(before - most, before + most);
             too_fast += usize::from(value != column[k]);
-            column[k] = value;
+            (column[k], before) = (value, value);
         }
     }
     too_fast

@@ -1,16 +1,25 @@
 //! Compensation: the drive for which the model's output follows a reference.
 
+mod backlash;
+mod compensation;
 mod dynamics;
+mod expected;
 mod input;
 mod output;
 mod plays;
 mod solve;
+mod start;
+mod static_curve;
 mod streaming;
 
-use crate::effects::{Effect, InputStage};
+use crate::effects::InputStage;
 use crate::linear::NoncausalFir;
 use crate::record::require_finite;
-use crate::{Error, Experiment, Matrix, Model, Record, SimulationError};
+use crate::{Error, Experiment, Matrix, Model, ModelState, Record, SimulationError};
+pub use compensation::{CompensateOptions, Compensation};
+pub use expected::ExpectedError;
+use expected::Run;
+pub use start::Start;
 pub use streaming::StreamingCompensator;
 
 /// An error below this fraction of the largest reference is rounding.
@@ -20,67 +29,16 @@ const EXACT: f64 = 1e-13;
 /// 10 % approach a limit, such as that of the drive.
 const WORTH: f64 = 0.9;
 
-/// Limits of the drive, and options of the method.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CompensateOptions {
-    /// Lower and upper limit of the drive of each input, in its unit. A single pair holds for all inputs, an empty list
-    /// means no limits.
-    pub limits: Vec<(f64, f64)>,
-    /// Largest slope of the drive, in units of the input per second.
-    pub slew: f64,
-    /// Whether only the DC gain of G is inverted, which needs no preview.
-    pub quasi_static: bool,
-    /// Number of samples by which the drive may begin before the reference; as many as G needs if `None`.
-    pub preview: Option<usize>,
-    /// Largest number of passes after the first. Each adds the remaining simulation error to the signal that is inverted.
-    pub passes: usize,
-}
-
-impl Default for CompensateOptions {
-    fn default() -> Self {
-        Self { limits: vec![], slew: f64::INFINITY, quasi_static: false, preview: None, passes: 20 }
-    }
-}
-
-/// A drive, and the output that the model predicts for it.
-#[derive(Clone, Debug)]
-pub struct Compensation {
-    /// u, (lead + samples, inputs).
-    pub drive: Matrix,
-    /// The reference, (lead + samples, outputs); constant at its first value during the lead.
-    pub reference: Matrix,
-    /// The outputs of the model for `drive`, without the effects that the input does not drive, (lead + samples, outputs).
-    pub predicted: Matrix,
-    /// The same for a drive proportional to the reference: the least squares line through `drive`.
-    pub in_proportion: Matrix,
-    /// Number of samples by which the drive begins before the reference.
-    pub lead: usize,
-    /// The error `reference - predicted` behind the lead.
-    pub error: SimulationError,
-    /// The error `reference - in_proportion` behind the lead.
-    pub error_in_proportion: SimulationError,
-    /// Root mean square error after each pass, over all outputs.
-    pub passes: Vec<f64>,
-    /// Number of samples at which a drive is at one of its `limits`, or at the end of the interval in which the envelope
-    /// increases.
-    pub out_of_reach: usize,
-    /// Number of samples at which the slope of a drive was limited to `slew`.
-    pub too_fast: usize,
-    /// The effects that the drive compensates.
-    pub compensated: Vec<&'static str>,
-    /// The effects that it does not compensate, each with the reason.
-    pub left: Vec<(&'static str, &'static str)>,
-}
-
 impl Model {
     /// The drive for which the outputs follow a `reference` (samples, outputs).
     ///
     /// The parts of the model are inverted from the output to the input: the output effects sample by sample, G by its
     /// noncausal inverse (46), the hysteresis by its exact inverse ([`crate::operators::Gpi::inverse`]), and a delay by an
     /// earlier drive. Creep and loops around G have no such inverse. Therefore the model is simulated, the remaining error
-    /// is added to the signal that is inverted, and the inversion is repeated as long as the error falls. Initially the
-    /// actuator is in the steady state of [`Model::start`] at the reference's first value; after its last sample, the
-    /// reference is taken as constant.
+    /// is added to the signal that is inverted, and the inversion is repeated as long as the error falls. Unless a
+    /// [`Start`] is given, the actuator is initially in the steady state of [`Model::start`] at the reference's first
+    /// value; after its last sample, the reference is taken as constant. [`Compensation::expected_error`] says how far the
+    /// stage itself will be from the reference.
     ///
     /// ```
     /// use gpi_core::compensate::CompensateOptions;
@@ -111,20 +69,33 @@ impl Model {
         let driven = self.driven();
         driven.require_reference(reference)?;
         let limits = driven.limits(&options.limits)?;
+        options.start.iter().try_for_each(|start| start.validate(&driven))?;
         let requirement = "the largest slope of the drive must be positive";
         Error::require(options.slew > 0.0, "slew", options.slew, requirement)?;
         let known = if options.quasi_static { driven.quasi_static()? } else { driven.clone() };
         let inverse = dynamics::inverse(&known, options)?;
         let lead = inverse.noncausal + input::lead(&known);
         let rows = lead + reference.nrows();
-        let reference =
+        let mut reference =
             Matrix::from_fn(rows, reference.ncols(), |k, o| reference[(k.saturating_sub(lead), o)]);
+        let start = options.start.as_ref().map(|own| own.of_part(self, &driven));
+        if let Some(start) = &start {
+            let held = Matrix::from_row_slice(1, start.input().len(), start.input());
+            let shown = driven.simulate_from(&mut start.state(&driven)?, &held)?;
+            reference.rows_mut(0, lead).row_iter_mut().for_each(|mut row| row.copy_from(&shown));
+        }
+        let begin = |model: &Self| {
+            let own = start.as_ref().map(|own| own.of_part(&driven, model).state(model));
+            own.transpose()
+        };
+        let begins =
+            Beginning { state: begin(&known)?, input: options.start.as_ref().map(Start::input) };
         let mut asked = reference.clone();
         let mut best: Option<(Found, f64)> = None;
         let mut passes = Vec::new();
         for _ in 0..=options.passes {
-            let found = known.drive_for(&asked, &inverse, &limits, options.slew)?;
-            let missed = &reference - known.simulate(&found.drive)?;
+            let found = known.drive_for(&asked, &inverse, &limits, options.slew, &begins)?;
+            let missed = &reference - known.simulate_begun(&begins.state, &found.drive)?;
             let scored = missed.rows(lead, rows - lead);
             let rms = (scored.norm_squared() / scored.len() as f64).sqrt();
             passes.push(rms);
@@ -143,22 +114,43 @@ impl Model {
                 "the inverse of the model is unbounded; invert the DC gain only (`quasi_static`)";
             return Err(Error::parameter("reference", f64::NAN, requirement));
         };
-        let predicted = driven.simulate(&found.drive)?;
-        let plain = driven.simulate(&proportional(&driven, &reference, &found.drive)?)?;
+        let begun = begin(&driven)?;
+        let predicted = driven.simulate_begun(&begun, &found.drive)?;
+        let curve = static_curve::static_curve(&driven, &reference, &found.drive)?;
+        let curve = driven.simulate_begun(&begun, &curve)?;
+        let first = || found.drive.row(0).iter().copied().collect();
+        let start = start.clone().unwrap_or_else(|| Start::Input(first()));
+        let run = Run {
+            model: &driven,
+            drive: &found.drive,
+            reference: &reference,
+            predicted: &predicted,
+            start: &start,
+            lead,
+        };
         Ok(Compensation {
+            expected_error: run.expected_error()?,
             error: driven.missed(&reference, &predicted, lead)?,
-            error_in_proportion: driven.missed(&reference, &plain, lead)?,
+            error_static_curve: driven.missed(&reference, &curve, lead)?,
             drive: found.drive,
             out_of_reach: found.out_of_reach,
             too_fast: found.too_fast,
             reference,
             predicted,
-            in_proportion: plain,
+            static_curve: curve,
             lead,
             passes,
             compensated,
             left,
         })
+    }
+
+    /// The outputs from a state, or from the steady state at the first input.
+    fn simulate_begun(&self, state: &Option<ModelState>, drive: &Matrix) -> Result<Matrix, Error> {
+        match state {
+            Some(state) => self.simulate_from(&mut state.clone(), drive),
+            None => self.simulate(drive),
+        }
     }
 
     /// The names of the effects that a drive compensates, and those of the others with the reason.
@@ -167,7 +159,7 @@ impl Model {
         for effect in self.effects() {
             if !effect.entry().driven {
                 left.push((effect.name(), "the input does not drive it"));
-            } else if is_added(effect) {
+            } else if effect.is_added() {
                 left.push((effect.name(), "the column that drives it is not known in advance"));
             } else if effect.place().input_stage().is_some_and(is_limited) {
                 left.push((
@@ -179,13 +171,6 @@ impl Model {
             }
         }
         (compensated, left)
-    }
-
-    /// The model without the effects that the input does not drive.
-    fn driven(&self) -> Self {
-        let mut driven = self.clone();
-        driven.effects.retain(|effect| effect.entry().driven && !is_added(effect));
-        driven
     }
 
     fn require_reference(&self, reference: &Matrix) -> Result<(), Error> {
@@ -220,11 +205,12 @@ impl Model {
         inverse: &NoncausalFir,
         limits: &[[f64; 2]],
         slew: f64,
+        begins: &Beginning,
     ) -> Result<Found, Error> {
         let v = dynamics::invert(inverse, &output::before_sensor(self, asked))?;
-        let (mut drive, out_of_reach) = plays::undone(self, &v, limits)?;
+        let (mut drive, out_of_reach) = plays::undone(self, &v, limits, begins.state.as_ref())?;
         input::advance(self, &mut drive);
-        let too_fast = input::slow_down(self, &mut drive, slew);
+        let too_fast = input::slow_down(self, &mut drive, slew, begins.input);
         Ok(Found { drive, out_of_reach, too_fast })
     }
 
@@ -248,9 +234,10 @@ fn is_limited(effect: &dyn InputStage) -> bool {
     effect.fastest().is_finite()
 }
 
-/// Whether the effect is added to the response to the input.
-fn is_added(effect: &Effect) -> bool {
-    effect.place().added().is_some()
+/// What is known of the stage before the drive begins.
+struct Beginning<'a> {
+    state: Option<ModelState>,
+    input: Option<&'a [f64]>,
 }
 
 /// A drive, and the numbers of samples at which a limit or the slew rate clamped it.
@@ -258,20 +245,4 @@ struct Found {
     drive: Matrix,
     out_of_reach: usize,
     too_fast: usize,
-}
-
-/// The drive proportional to the v that G needs in steady state: the least squares line through another drive.
-fn proportional(model: &Model, reference: &Matrix, drive: &Matrix) -> Result<Matrix, Error> {
-    let still = Matrix::from_fn(reference.nrows(), reference.ncols(), |k, o| {
-        reference[(k, o)] - model.offsets()[o]
-    });
-    let mut line = still * dynamics::inverse_gain(model.linear())?.transpose();
-    for (mut v, u) in line.column_iter_mut().zip(drive.column_iter()) {
-        let (v_mean, u_mean) = (v.mean(), u.mean());
-        v.add_scalar_mut(-v_mean);
-        let squares = v.norm_squared();
-        let slope = if squares > 0.0 { v.dot(&u.add_scalar(-u_mean)) / squares } else { 0.0 };
-        v.apply(|value| *value = u_mean + slope * *value);
-    }
-    Ok(line)
 }

@@ -1,5 +1,6 @@
 //! Inversion of the hysteresis: exactly, or sample by sample if effects act on its plays.
 
+use super::backlash::{continued, rising};
 use super::solve::zero_of;
 use crate::effects::{Effect, Stage};
 use crate::operators::{GpiState, Operator};
@@ -15,11 +16,13 @@ const FIRST_STEP: f64 = 1e-3;
 /// Least first step of the search, as a fraction of the largest v, for samples at which u does not change.
 const LEAST_STEP: f64 = 1e-6;
 
-/// The drive (samples, inputs) for v (samples, inputs) from the initial state, and the number of samples at a limit.
+/// The drive (samples, inputs) for v (samples, inputs), and the number of samples at a limit; from a state, or from the
+/// steady state at the first drive.
 pub(super) fn undone(
     model: &Model,
     v: &Matrix,
     limits: &[[f64; 2]],
+    begins: Option<&ModelState>,
 ) -> Result<(Matrix, usize), Error> {
     let (mut drive, mut out_of_reach) = (v.clone(), 0);
     for (input, (mut column, &limits)) in drive.column_iter_mut().zip(limits).enumerate() {
@@ -27,11 +30,16 @@ pub(super) fn undone(
         let acts = |effect: &Effect| {
             effect.stage() == Stage::Plays && effect.place().input() == Some(input)
         };
-        let inverse = hysteresis.inverse_within(limits[0], limits[1])?;
+        let rising = rising(hysteresis)?;
+        let inverse = rising.inverse_within(limits[0], limits[1])?;
         if model.effects().iter().any(acts) {
-            out_of_reach += follow(model, input, column.as_mut_slice(), inverse.drive())?;
+            let plays = begins.map(|state| Plays::of(model, input, state.clone()));
+            out_of_reach += follow(model, input, column.as_mut_slice(), inverse.drive(), plays)?;
         } else {
-            let mut state = inverse.rest();
+            let mut state = match begins {
+                Some(state) => rising.inverse_state(&continued(hysteresis, state, input)?)?,
+                None => inverse.rest(),
+            };
             inverse.in_place(&mut state, column.as_mut_slice());
             out_of_reach += state.out_of_reach as usize;
         }
@@ -53,8 +61,13 @@ impl<'a> Plays<'a> {
     fn at_steady_state(model: &'a Model, input: usize, u: f64) -> Result<Self, Error> {
         let mut inputs = vec![0.0; model.inputs().len()];
         inputs[input] = u;
-        let ModelState { mut hysteresis, effects: memories, .. } = model.start(&inputs)?;
-        Ok(Self { model, input, state: hysteresis.swap_remove(input), memories })
+        Ok(Self::of(model, input, model.start(&inputs)?))
+    }
+
+    /// Those of a state.
+    fn of(model: &'a Model, input: usize, state: ModelState) -> Self {
+        let ModelState { mut hysteresis, effects: memories, .. } = state;
+        Self { model, input, state: hysteresis.swap_remove(input), memories }
     }
 
     /// v for the next sample.
@@ -66,15 +79,16 @@ impl<'a> Plays<'a> {
 }
 
 /// Replaces v of an input by u, and counts the samples for which no u between the limits exists.
-fn follow(
-    model: &Model,
+fn follow<'a>(
+    model: &'a Model,
     input: usize,
     signal: &mut [f64],
     limits: [f64; 2],
+    mut plays: Option<Plays<'a>>,
 ) -> Result<usize, Error> {
     let size = signal.iter().fold(f64::MIN_POSITIVE, |size, v| size.max(v.abs()));
-    let mut plays: Option<Plays> = None;
-    let (mut out_of_reach, mut before, mut stride) = (0, 0.0, FIRST_STEP * size);
+    let mut before = plays.as_ref().map_or(0.0, |plays| plays.state.envelope.previous);
+    let (mut out_of_reach, mut stride) = (0, FIRST_STEP * size);
     for value in signal {
         let wanted = *value;
         let reached = |u: f64| {

@@ -1,5 +1,6 @@
 //! The compensator for real-time use, which computes one sample of the drive at a time.
 
+use super::backlash::half_gap;
 use crate::effects::{Effect, Place, Stage};
 use crate::operators::{Compensator, Lags};
 use crate::{Error, Model};
@@ -41,8 +42,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// The model has several inputs or outputs, the envelope does not increase between the limits, or the hysteresis or
-    /// the DC gain has no inverse.
+    /// The model has several inputs or outputs, the envelope does not increase between the limits, the plays have a gap
+    /// (backlash), or the hysteresis or the DC gain has no inverse.
     pub fn compensator(&self, (lower, upper): (f64, f64)) -> Result<StreamingCompensator, Error> {
         for (name, channels) in [("inputs", self.inputs()), ("outputs", self.outputs())] {
             Error::require_equal(name, ("model", channels.len()), ("a compensator", 1))?;
@@ -72,6 +73,11 @@ impl Model {
             } else {
                 left.push((effect.name(), reason(effect)));
             }
+        }
+        if let Some(half_gap) = half_gap(&self.hysteresis()[0]) {
+            let requirement = "half the gap of the plays (backlash): at each reversal the drive would have to jump across it \
+                               at once, which is possible only for a reference known in advance (`compensate`)";
+            return Err(Error::parameter("half_widths", half_gap, requirement));
         }
         let hysteresis = self.hysteresis()[0].inverse_within(lower, upper)?;
         let offset = self.offsets()[0];

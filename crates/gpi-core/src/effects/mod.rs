@@ -159,6 +159,11 @@ impl Effect {
         self.place().stage()
     }
 
+    /// Whether it is added to the response to the input.
+    pub(crate) fn is_added(&self) -> bool {
+        self.place().added().is_some()
+    }
+
     /// What every effect that acts in the chain has; `None` for a finding.
     pub fn block(&self) -> Option<&dyn Block> {
         self.place().block()

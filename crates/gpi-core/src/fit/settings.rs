@@ -148,6 +148,15 @@ settings! {
         /// Part of the longest experiment: a slower pole follows a disturbance. By hand.
         part: f64 = 0.05, PART;
     }
+
+    /// The part of a residual that is not white noise.
+    struct MisfitSettings {
+        /// Lags over which the autocovariance is averaged: a misfit is smooth over some samples, and many lags see a small
+        /// one that is slow. By hand.
+        lags: [usize; 3] = [1, 3, 10], FROM_ONE;
+        /// Standard errors of white noise that a mean must exceed: noise alone does so once in forty times.
+        standard_errors: f64 = 2.0, 0.0..=100.0;
+    }
 }
 
 /// Part of the outputs' squares that rounding leaves: the square of some thousand times the machine's epsilon.
@@ -161,6 +170,7 @@ mod tests {
     fn usual_settings_are_valid() {
         FitSettings::default().validate().unwrap();
         HysteresisSettings::default().validate().unwrap();
+        MisfitSettings::default().validate().unwrap();
     }
 
     #[test]

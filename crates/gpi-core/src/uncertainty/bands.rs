@@ -44,6 +44,16 @@ impl Bands {
         self.point.dynamics.d.shape()
     }
 
+    /// The change of any function of the point over one standard deviation along each axis of the covariance.
+    pub(crate) fn axes(
+        &self,
+        function: impl Fn(&Point) -> Result<Vec<f64>, Error>,
+    ) -> Result<Vec<Vec<f64>>, Error> {
+        let values = self.table.values(&self.point);
+        let moved = |step: &DVector<f64>| function(&self.point.moved(step, &self.table));
+        self.uncertainty.axes(&values, moved)
+    }
+
     /// Standard deviations of any function of the point.
     fn spread(
         &self,

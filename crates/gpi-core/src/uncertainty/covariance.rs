@@ -6,12 +6,15 @@
 //! with `L_k <= 1e-12 L_max` are unidentifiable: they are left out of the inverse and kept apart, and the deviation of
 //! every parameter that takes part in one is NaN. Unknowns at a bound are held and have variance zero.
 //!
+//! C is computed as `F F'`, `F = V L^(-1/2) Q D^(1/2)` with `L^(-1/2) V' M V L^(-1/2) = Q D Q'`: products of inverses would lose
+//! the small variances of combinations of parameters of which each alone is hardly determined.
+//!
 //! The number of samples of white noise that the fit uses up is `tr(H^-1 M) / sigma^2`, sigma^2 the residual's variance:
 //! the number of unknowns for white noise, since M is then `sigma^2 H`, and more for slow noise (K. Takeuchi, 1976).
 //!
 //! A function f of the unknowns has the variance `g' C g`, g its gradient (delta method). With the axes
-//! `d_k = S U_k sqrt(l_k)` of `C = S (U l U') S`, S the diagonal matrix of standard deviations, it is the sum of squares of
-//! the derivatives along them: `sum_k ((f(theta + h d_k) - f(theta - h d_k)) / (2 h))^2`.
+//! `d_k = F U_k` of `C = F F'`, U the principal axes of F with rows of unit length, it is the sum of squares of the derivatives
+//! along them: `sum_k ((f(theta + h d_k) - f(theta - h d_k)) / (2 h))^2`.
 
 use super::settings::CovarianceSettings;
 use crate::linear::symmetric_eigen;
@@ -23,6 +26,8 @@ use nalgebra::DVector;
 pub(crate) struct Uncertainty {
     /// (unknowns, unknowns); zero for those that are held.
     pub covariance: Matrix,
+    /// F, (unknowns, directions), with the covariance F F'.
+    factor: Matrix,
     /// Unidentifiable directions, (unknowns, directions), of unit length after scaling
     /// every unknown by its column's norm.
     pub open: Matrix,
@@ -58,26 +63,28 @@ impl Uncertainty {
         let largest = values.iter().copied().fold(0.0, f64::max);
         let rank =
             values.iter().take_while(|&&value| value > settings.identifiable * largest).count();
-        let known = vectors.columns(0, rank);
-        let inverse = known
-            * Matrix::from_diagonal(&values.rows(0, rank).map(|v| 1.0 / v))
-            * known.transpose();
-        let scores = scaled(&scores);
-        let used = (&inverse * &scores).trace() * samples / cost.max(f64::MIN_POSITIVE);
-        let reduced = &inverse * scores * &inverse;
-        let mut covariance = Matrix::zeros(unknowns, unknowns);
-        for (i, &row) in free.iter().enumerate() {
-            for (j, &column) in free.iter().enumerate() {
-                covariance[(row, column)] = reduced[(i, j)] / (scale[i] * scale[j]);
-            }
+        let mut root = vectors.columns(0, rank).into_owned();
+        for (mut column, value) in root.column_iter_mut().zip(values.iter()) {
+            column /= value.sqrt();
         }
+        let (spread, turned) = descending_eigen(root.transpose() * scaled(&scores) * &root);
+        let used = spread.sum() * samples / cost.max(f64::MIN_POSITIVE);
+        let mut reduced = root * turned;
+        for (mut column, spread) in reduced.column_iter_mut().zip(spread.iter()) {
+            column *= spread.max(0.0).sqrt();
+        }
+        let mut factor = Matrix::zeros(unknowns, rank);
+        for (i, &row) in free.iter().enumerate() {
+            factor.row_mut(row).copy_from(&(reduced.row(i) / scale[i]));
+        }
+        let covariance = &factor * factor.transpose();
         let mut open = Matrix::zeros(unknowns, free.len() - rank);
         for direction in rank..free.len() {
             for (i, &row) in free.iter().enumerate() {
                 open[(row, direction - rank)] = vectors[(i, direction)];
             }
         }
-        Self { covariance, open, used, estimated: free.len(), settings }
+        Self { covariance, factor, open, used, estimated: free.len(), settings }
     }
 
     /// Standard deviations of the unknowns; NaN where an unidentifiable direction takes part.
@@ -103,16 +110,30 @@ impl Uncertainty {
         self.open.column_iter().map(direction).collect()
     }
 
-    /// Standard deviations of functions of the point, from central differences along the principal
-    /// axes of the covariance.
-    ///
-    /// `values` are those of the unknowns: a step stays far below them, also along an axis that is
-    /// unidentifiable.
+    /// Standard deviations of functions of the point: root of the sum of squares of [`Uncertainty::axes`].
     pub(crate) fn spread(
         &self,
         values_of: &[f64],
         moved: impl Fn(&DVector<f64>) -> Result<Vec<f64>, Error>,
     ) -> Result<Vec<f64>, Error> {
+        let mut variances: Vec<f64> = Vec::new();
+        for axis in self.axes(values_of, moved)? {
+            variances.resize(axis.len(), 0.0);
+            variances.iter_mut().zip(&axis).for_each(|(sum, change)| *sum += change.powi(2));
+        }
+        Ok(variances.into_iter().map(f64::sqrt).collect())
+    }
+
+    /// The change of functions of the point along each principal axis of the covariance, over one standard deviation: their
+    /// covariance is the sum of the outer products. From central differences.
+    ///
+    /// `values` are those of the unknowns: a step stays far below them, also along an axis that is
+    /// unidentifiable.
+    pub(crate) fn axes(
+        &self,
+        values_of: &[f64],
+        moved: impl Fn(&DVector<f64>) -> Result<Vec<f64>, Error>,
+    ) -> Result<Vec<Vec<f64>>, Error> {
         let CovarianceSettings { step: longest, part: most, least, axes, .. } = self.settings;
         let largest = values_of.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let reach = |value: f64| most * value.abs().max(least * largest);
@@ -120,13 +141,12 @@ impl Uncertainty {
         // threshold zero, on whose two sides the deadzone is another one.
         let scale = self.covariance.diagonal().map(|square| square.max(0.0).sqrt());
         let divisor = scale.map(|value| if value > 0.0 { value } else { 1.0 });
-        let n = scale.len();
-        let correlation =
-            Matrix::from_fn(n, n, |i, j| self.covariance[(i, j)] / (divisor[i] * divisor[j]));
-        let (values, vectors) = descending_eigen(correlation);
-        let mut variances: Vec<f64> = Vec::new();
-        for (axis, &value) in values.iter().enumerate().take_while(|(_, value)| **value > axes) {
-            let deviation = vectors.column(axis).component_mul(&scale) * value.sqrt();
+        let mut scaled = self.factor.clone();
+        scaled.column_iter_mut().for_each(|mut column| column.component_div_assign(&divisor));
+        // any rotation leaves F F' as it is: rounding of the eigenvectors does no harm
+        let (values, vectors) = descending_eigen(scaled.tr_mul(&scaled));
+        let along = |(axis, _): (usize, &f64)| {
+            let deviation = &self.factor * vectors.column(axis);
             let parts = deviation.iter().zip(values_of);
             let fraction = parts
                 .filter(|(part, _)| **part != 0.0)
@@ -134,12 +154,10 @@ impl Uncertainty {
                 .fold(longest, f64::min);
             let step = deviation * fraction;
             let (above, below) = (moved(&step)?, moved(&-step)?);
-            variances.resize(above.len(), 0.0);
-            for (sum, (above, below)) in variances.iter_mut().zip(above.iter().zip(&below)) {
-                *sum += ((above - below) / (2.0 * fraction)).powi(2);
-            }
-        }
-        Ok(variances.into_iter().map(f64::sqrt).collect())
+            let change = |(above, below): (&f64, &f64)| (above - below) / (2.0 * fraction);
+            Ok(above.iter().zip(&below).map(change).collect())
+        };
+        values.iter().enumerate().take_while(|(_, value)| **value > axes).map(along).collect()
     }
 }
 

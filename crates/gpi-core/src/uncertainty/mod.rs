@@ -5,7 +5,9 @@ pub(crate) mod covariance;
 pub(crate) mod noise_floor;
 pub(crate) mod noise_model;
 pub(crate) mod outliers;
+mod prediction;
 pub(crate) mod settings;
 
 pub use bands::{Bands, PoleDeviations, ResponseDeviation};
 pub use noise_floor::{NoiseFloor, NoiseMethod};
+pub use prediction::Prediction;

@@ -1,12 +1,13 @@
 //! A drive that makes the outputs follow a reference.
 
-use crate::arrays::{from_signal, from_vector, signal};
+use crate::arrays::{from_signal, from_vector, signal, vector};
 use crate::channels::{names, units};
 use crate::errors::{parameter, to_python};
 use crate::figures::figures;
+use crate::model::read_state;
 use crate::plotting::plot;
 use gpi_core::Channel;
-use gpi_core::compensate::{CompensateOptions, Compensation as Found};
+use gpi_core::compensate::{CompensateOptions, Compensation as Found, Start};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -76,7 +77,8 @@ impl Compensation {
         self.found.lead
     }
 
-    /// Error of the prediction, the reference minus ``predicted``, without the lead.
+    /// Error of the inversion, the reference minus ``predicted``, without the lead: what the model itself leaves. See
+    /// ``expected_error`` for the error of the stage.
     ///
     /// The figures are those of ``Model.error``: ``rms`` and ``max`` in the output's unit, ``nrmse``, ``fit_percent``.
     #[getter]
@@ -84,18 +86,39 @@ impl Compensation {
         figures(py, &self.found.error)
     }
 
-    /// The outputs that the model predicts without compensation: for a drive that is a linear function of the reference, the
-    /// regression line of ``drive``; in the outputs' units, the shape of the drive.
+    /// The error of the true output, without the noise of the sensor, that is to be expected behind the lead, (T10) in the theory.
+    ///
+    /// ``rms`` over all outputs; ``bound``, which 95 % of the errors at the worst sample do not exceed; ``parts``: ``inversion``,
+    /// ``parameters``, ``model`` and ``past``, whose squares add up to that of ``rms``; ``missing``, the names of the parts that
+    /// are None because the model does not know its own uncertainty: ``rms`` is too small then. All in the output's unit.
     #[getter]
-    fn in_proportion<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        from_signal(py, self.found.in_proportion.clone(), self.one_dimensional)
+    fn expected_error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let expected = &self.found.expected_error;
+        let parts = PyDict::new(py);
+        parts.set_item("inversion", expected.inversion)?;
+        parts.set_item("parameters", expected.parameters)?;
+        parts.set_item("model", expected.model)?;
+        parts.set_item("past", expected.past)?;
+        let result = PyDict::new(py);
+        result.set_item("rms", expected.rms)?;
+        result.set_item("bound", expected.bound)?;
+        result.set_item("parts", parts)?;
+        result.set_item("missing", expected.missing())?;
+        Ok(result)
     }
 
-    /// Error without compensation, the reference minus ``in_proportion``, with the figures of ``error`` (``rms`` and ``max`` in the
+    /// The outputs that the model predicts without compensation: for the drive that is a static curve of the reference, the
+    /// polynomial of degree 5 that comes nearest to ``drive``; in the outputs' units, the shape of the drive.
+    #[getter]
+    fn static_curve<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        from_signal(py, self.found.static_curve.clone(), self.one_dimensional)
+    }
+
+    /// Error without compensation, the reference minus ``static_curve``, with the figures of ``error`` (``rms`` and ``max`` in the
     /// output's unit).
     #[getter]
-    fn error_in_proportion<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        figures(py, &self.found.error_in_proportion)
+    fn error_static_curve<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        figures(py, &self.found.error_static_curve)
     }
 
     /// Root mean square error after each pass, in the output's unit, shape (passes,).
@@ -140,7 +163,7 @@ impl Compensation {
     }
 
     fn __repr__(&self) -> String {
-        let (error, before) = (self.found.error.rms, self.found.error_in_proportion.rms);
+        let (error, before) = (self.found.expected_error.rms, self.found.error_static_curve.rms);
         let mut held = String::new();
         for (count, what) in
             [(self.found.out_of_reach, "at a limit"), (self.found.too_fast, "held back")]
@@ -150,7 +173,7 @@ impl Compensation {
             }
         }
         format!(
-            "Compensation({} samples{held}, rms error {error:.3e}, {before:.3e} in proportion)",
+            "Compensation({} samples{held}, expected rms error {error:.3e}, static curve {before:.3e})",
             self.found.drive.nrows()
         )
     }
@@ -177,4 +200,45 @@ pub(crate) fn read_limits(limits: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<(f6
     }
     let message = "`limits` must be a pair of numbers, or a list of such pairs";
     limits.extract().map_err(|_| parameter(message.to_owned()))
+}
+
+/// Where the stage stands before the drive begins: the input at rest, with a measured output or with a state.
+pub(crate) fn read_start(
+    model: &gpi_core::Model,
+    start: Option<&Bound<'_, PyAny>>,
+    output: Option<f64>,
+    state: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Option<Start>> {
+    let Some(start) = start else {
+        let alone = [("start_output", output.is_some()), ("start_state", state.is_some())];
+        return match alone.into_iter().find(|(_, given)| *given) {
+            Some((name, _)) => {
+                let message = format!("`{name}` needs `start`, the input at which the stage rests");
+                Err(parameter(message))
+            }
+            None => Ok(None),
+        };
+    };
+    let input = match start.extract::<f64>() {
+        Ok(input) => vec![input],
+        Err(_) => vector("start", start)?,
+    };
+    match (output, state) {
+        (Some(_), Some(_)) => {
+            let message = "`start_output` and `start_state` exclude each other; give one of them";
+            Err(parameter(message.to_owned()))
+        }
+        (Some(output), None) => match input[..] {
+            [input] => Ok(Some(Start::Output { input, output })),
+            _ => {
+                let message = "`start_output` needs a model of one input; give `start_state`";
+                Err(parameter(message.to_owned()))
+            }
+        },
+        (None, Some(state)) => {
+            let state = read_state(model, &vector("start_state", state)?)?;
+            Ok(Some(Start::State { input, state }))
+        }
+        (None, None) => Ok(Some(Start::Input(input))),
+    }
 }

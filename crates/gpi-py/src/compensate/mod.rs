@@ -3,7 +3,7 @@
 mod compensation;
 mod compensator;
 
-pub(crate) use compensation::{Compensation, compensate, read_limits};
+pub(crate) use compensation::{Compensation, compensate, read_limits, read_start};
 pub(crate) use compensator::Compensator;
 
 use pyo3::prelude::*;

@@ -4,6 +4,7 @@ mod explanation;
 mod residual_tests;
 mod rows;
 
+use crate::errors::to_python;
 use crate::identify::grid;
 use crate::model::Refinement;
 use crate::operators::read_reading;
@@ -95,9 +96,10 @@ fn explain(
     let own = record.bind(py).borrow();
     let (measured, holdout) = (&own.record, holdout.map(|other| &other.record));
     let on_another_record = holdout.is_some();
-    let found = interruptible_in_part(py, progress, |report| {
+    let mut found = interruptible_in_part(py, progress, |report| {
         core::explain(measured, holdout, &options, report)
     })?;
+    found.model = found.model.with_prediction(&found.refinement, measured).map_err(to_python)?;
     drop(own);
     let refinement = Py::new(py, Refinement::new(&found.model, found.refinement.clone())?)?;
     Ok(Explanation { found, record, refinement, on_another_record })

@@ -7,6 +7,7 @@ mod sensitivities;
 
 pub(crate) use grid::grid;
 
+use crate::errors::to_python;
 use crate::model::{Identification, Model, Refinement};
 use crate::operators::read_reading;
 use crate::progress::interruptible;
@@ -96,8 +97,9 @@ fn identify(
     };
     let record = &record.record;
     let found = interruptible(py, progress, |report| core::identify(record, &options, report))?;
-    let model = found.model.clone();
-    let refinement = Refinement::new(&found.model, found.refinement.clone())?;
+    let model =
+        found.model.clone().with_prediction(&found.refinement, record).map_err(to_python)?;
+    let refinement = Refinement::new(&model, found.refinement.clone())?;
     let refinement = Some(Py::new(py, refinement)?);
     Ok(Model { model, identification: Some(Py::new(py, Identification { found })?), refinement })
 }

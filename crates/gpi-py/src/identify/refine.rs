@@ -1,5 +1,6 @@
 //! Joint refinement of all parts of a model.
 
+use crate::errors::to_python;
 use crate::model::{Model, Refinement};
 use crate::progress::interruptible;
 use crate::record::Record;
@@ -71,6 +72,7 @@ pub(super) fn refine(
     let (start, record) = (&model.model, &record.record);
     let (refined, refinement) =
         interruptible(py, progress, |report| core::refine(start, record, &options, report))?;
+    let refined = refined.with_prediction(&refinement, record).map_err(to_python)?;
     let refinement = Some(Py::new(py, Refinement::new(&refined, refinement)?)?);
     Ok(Model { model: refined, identification: None, refinement })
 }

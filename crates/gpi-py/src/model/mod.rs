@@ -7,6 +7,7 @@ mod state;
 
 pub(crate) use identification::Identification;
 pub(crate) use refinement::Refinement;
+pub(crate) use state::read as read_state;
 
 use crate::arrays::{from_matrix, from_signal, from_vector, signal, vector};
 use crate::channels::{label, names, units};
@@ -214,7 +215,8 @@ impl Model {
     }
 
     #[doc = include_str!("../docs/model/compensate.txt")]
-    #[pyo3(signature = (reference, *, limits = None, slew = None, quasi_static = false, preview = None, passes = 20))]
+    #[pyo3(signature = (reference, *, limits = None, slew = None, quasi_static = false, preview = None, passes = 20,
+        start = None, start_output = None, start_state = None))]
     fn compensate(
         &self,
         py: Python<'_>,
@@ -224,10 +226,14 @@ impl Model {
         quasi_static: bool,
         preview: Option<usize>,
         passes: usize,
+        start: Option<&Bound<'_, PyAny>>,
+        start_output: Option<f64>,
+        start_state: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Compensation> {
         let slew = slew.unwrap_or(f64::INFINITY);
         let limits = compensate::read_limits(limits)?;
-        let options = CompensateOptions { limits, slew, quasi_static, preview, passes };
+        let start = compensate::read_start(&self.model, start, start_output, start_state)?;
+        let options = CompensateOptions { limits, slew, quasi_static, preview, passes, start };
         compensate::compensate(py, &self.model, reference, &options)
     }
 

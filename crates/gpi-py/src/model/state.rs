@@ -20,7 +20,7 @@ pub(super) fn write(state: &ModelState) -> Vec<f64> {
 }
 
 /// The inverse of [`write`].
-pub(super) fn read(model: &Model, values: &[f64]) -> PyResult<ModelState> {
+pub(crate) fn read(model: &Model, values: &[f64]) -> PyResult<ModelState> {
     let sizes: Vec<usize> =
         model.hysteresis().iter().map(|h| 1 + h.plays().weights().len()).collect();
     let expected = sizes.iter().sum::<usize>() + model.linear().order();
