@@ -316,7 +316,8 @@ def test_a_model_file_keeps_the_effect(name, tmp_path):
     model.save(tmp_path / "model.json")
     again = gpi.load(tmp_path / "model.json")
     assert again.effects == model.effects and [effect["name"] for effect in again.effects] == [name]
-    assert all(set(row) == {"name", "value", "std", "unit", "determined"} for row in again.effects[0]["parameters"])
+    columns = {"name", "value", "std", "unit", "determined"}
+    assert all(set(row) == columns for row in again.effects[0]["parameters"])
     u = wander()
     np.testing.assert_array_equal(again.simulate(u), model.simulate(u))
 

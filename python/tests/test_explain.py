@@ -214,7 +214,7 @@ def test_the_contract_of_the_answer():
             assert set(figures) == {"rms", "nrmse", "fit_percent", "max"}
     assert answer["steps"][0]["effect"] is None
     assert [step["effect"] for step in answer["steps"][1:]].count("periodic-disturbance") >= 1
-    assert {"value", "std", "unit"} == set(answer["steps"][1]["parameters"]["frequency"])
+    assert {"value", "std", "unit", "determined"} == set(answer["steps"][1]["parameters"]["frequency"])
     assert {"name", "statistic", "threshold", "passed"} <= set(answer["residual"]["tests"][0])
     assert answer["verdict"] in ("explained", "partly-explained", "unattributed", "outside-class")
     assert (answer["verdict"] == "outside-class") == (answer["verdict_reason"] is not None)

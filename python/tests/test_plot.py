@@ -195,9 +195,10 @@ def test_history_ends_at_the_residual_above_the_floor(model: gpi.Model) -> None:
 def test_a_loaded_model_has_no_bands_and_says_so(record: gpi.Record, model: gpi.Model) -> None:
     loaded = gpi.Model.from_json(model.to_json())
     assert "not from identify" in gpi.plot.candidates(loaded).texts[0].get_text()
-    assert "not refined" in gpi.plot.history(loaded).texts[0].get_text()
+    assert "do not contain" in gpi.plot.history(loaded).texts[0].get_text()
     assert not gpi.plot.markov(loaded).collections
     assert not gpi.plot.loop(record.u[0], record.y[0], loaded).collections
+    assert gpi.plot.bode(loaded.linear, refinement=loaded.refinement).lines
 
 
 def test_a_refinement_of_other_channels_is_refused(model: gpi.Model) -> None:

@@ -5,7 +5,16 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from gpi_hammerstein._native import Fir, Model, ParameterError, Refinement, StateSpace
-from gpi_hammerstein.plot.style import BLACK, BLUE, VERMILION, axes, line_style, say_nothing_to_draw, shade
+from gpi_hammerstein.plot.style import (
+    BLACK,
+    BLUE,
+    VERMILION,
+    axes,
+    line_style,
+    say_nothing_to_draw,
+    shade,
+    with_bands,
+)
 
 DECIBELS = 20 / np.log(10)
 # Decay of the slowest pole at the end of a drawn impulse response, and limits of the number of taps.
@@ -41,8 +50,8 @@ def markov(response: Fir | Model, ax: Axes | None = None) -> Axes:
     else:
         taps = settling_taps(response.linear)
         values = response.linear.markov(taps)
-        if response.refinement is not None:
-            deviations = response.refinement.markov_std(taps)
+        if (known := with_bands(response.refinement)) is not None:
+            deviations = known.markov_std(taps)
         title = f"Impulse response of G, order {response.linear.order}"
     outputs, inputs, taps = values.shape
     lags = np.arange(taps, dtype=np.float64)
@@ -117,7 +126,8 @@ def bode(
     response = sys.frequency_response(angles)
     x = angles if rate is None else angles * rate / (2 * np.pi)
     _, outputs, inputs = response.shape
-    deviations = None if refinement is None else refinement.response_std(angles)
+    known = with_bands(refinement)
+    deviations = None if known is None else known.response_std(angles)
     if deviations is not None and deviations[0].shape != response.shape:
         _, rows, columns = deviations[0].shape
         raise ParameterError(

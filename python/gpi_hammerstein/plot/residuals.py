@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from gpi_hammerstein._native import Explanation, Model, Record
 from gpi_hammerstein.io import raise_warmup
 from gpi_hammerstein.plot.explanation import title
-from gpi_hammerstein.plot.style import BAND, BLACK, BLUE, ORANGE, axes, label
+from gpi_hammerstein.plot.style import BLACK, BLUE, ORANGE, axes, label
+from gpi_hammerstein.uncertain import BAND
 
 Array = NDArray[np.float64]
 

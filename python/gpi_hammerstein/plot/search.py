@@ -100,8 +100,9 @@ def history(found: Model | Refinement, ax: Axes | None = None) -> Axes:
     refinement = found.refinement if isinstance(found, Model) else found
     unit = found.output_units[0] if isinstance(found, Model) and len(found.output_names) == 1 else ""
     ax.set(xlabel="accepted steps [-]", ylabel=label("residual rms", unit or "-"), title="Joint refinement")
-    if refinement is None:
-        say_nothing_to_draw(ax, "no steps: the model was not refined")
+    if refinement is None or not refinement.complete:
+        why = "the model was not refined" if refinement is None else "model files do not contain them"
+        say_nothing_to_draw(ax, f"no steps: {why}")
         return ax
     steps = refinement.history
     ax.plot(np.arange(len(steps)), steps, "o-", ms=3, lw=1.0, color=BLUE, label=refinement.status)

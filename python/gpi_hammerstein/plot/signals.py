@@ -14,6 +14,7 @@ from gpi_hammerstein.plot.style import (
     label,
     legend_above,
     shade_path,
+    with_bands,
 )
 
 Array = NDArray[np.float64]
@@ -57,8 +58,8 @@ def loop(u: ArrayLike, v: ArrayLike, model: Model | None = None, ax: Axes | None
         unit_in, unit_out = model.input_units[0], model.output_units[0]
         own = model.intermediate(x).reshape(-1)
         ax.plot(x, own, color=VERMILION, lw=0.7, ls="--", label="model")
-        if model.refinement is not None:
-            shade_path(ax, x, own, model.refinement.loop_std(x).reshape(-1), VERMILION, unit_out)
+        if (known := with_bands(model.refinement)) is not None:
+            shade_path(ax, x, own, known.loop_std(x).reshape(-1), VERMILION, unit_out)
         # The place of the legend is fixed, because the search for the best place takes long for long records.
         ax.legend(loc="upper left")
     ax.set_xlabel(label("input u", unit_in))
@@ -74,8 +75,8 @@ def draw_loop(ax: Axes, model: Model, u: Array, v_hat: Array | None) -> None:
     else:
         v = model.intermediate(u)[:, 0]
         loop(u[:, 0], v, ax=ax)
-        if model.refinement is not None:
-            shade_path(ax, u[:, 0], v, model.refinement.loop_std(u)[:, 0], BLUE, model.output_units[0])
+        if (known := with_bands(model.refinement)) is not None:
+            shade_path(ax, u[:, 0], v, known.loop_std(u)[:, 0], BLUE, model.output_units[0])
             ax.legend(loc="upper left")
     ax.set_xlabel(label(model.input_names[0], model.input_units[0]))
     ax.set_ylabel(label("intermediate signal v", model.output_units[0]))

@@ -9,6 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
+from gpi_hammerstein._native import Refinement
+from gpi_hammerstein.uncertain import BAND
+
 # The palette of Okabe and Ito, which can be distinguished with every kind of colour vision.
 BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 PURPLE, SKY, BLACK = "#CC79A7", "#56B4E9", "#000000"
@@ -18,8 +21,6 @@ STYLES = ("-", "--", ":", "-.")
 # Distance in points between the axes and a title above a legend.
 ABOVE_LEGEND = 26.0
 
-# Number of standard deviations to each side that contain 95 % of a normal distribution.
-BAND = 1.96
 BAND_LABEL = "95 % band"
 SHADE = 0.25
 
@@ -58,6 +59,11 @@ def say_nothing_to_draw(ax: Axes, why: str) -> None:
     """Write a message on the axes if there is nothing to draw."""
     ax.text(0.5, 0.5, why, ha="center", va="center", transform=ax.transAxes)
     ax.set(xticks=[], yticks=[])
+
+
+def with_bands(refinement: Refinement | None) -> Refinement | None:
+    """Return the refinement if it has uncertainty bands, which model files do not contain."""
+    return refinement if refinement is not None and refinement.complete else None
 
 
 def shade(

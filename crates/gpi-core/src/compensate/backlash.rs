@@ -48,9 +48,10 @@ pub(super) fn continued(
     let own = &state.hysteresis[input];
     let mut places = own.plays.plays().to_vec();
     if half_gap(hysteresis).is_some() {
-        let z = hysteresis.envelope().step(&mut own.envelope.clone(), own.envelope.previous);
+        let mut envelope = own.envelope;
+        let z = hysteresis.envelope().step(&mut envelope, own.envelope.previous);
         places.push(z);
     }
     let plays = rising(hysteresis)?.plays().state_from(places)?;
-    Ok(GpiState { envelope: own.envelope.clone(), plays })
+    Ok(GpiState { envelope: own.envelope, plays })
 }

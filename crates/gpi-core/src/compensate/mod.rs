@@ -116,9 +116,12 @@ impl Model {
         };
         let begun = begin(&driven)?;
         let predicted = driven.simulate_begun(&begun, &found.drive)?;
-        let curve = static_curve::static_curve(&driven, &reference, &found.drive)?;
-        let curve = driven.simulate_begun(&begun, &curve)?;
-        let first = || found.drive.row(0).iter().copied().collect();
+        let simulate = |drive: &Matrix| driven.simulate_begun(&begun, drive);
+        let curve = static_curve::static_curve(&driven, &reference, &found.drive, simulate)?;
+        // zero stays zero after rounding, because the past is known there
+        let rounding = EXACT * found.drive.amax();
+        let exact = |input: &f64| if input.abs() <= rounding { 0.0 } else { *input };
+        let first = || found.drive.row(0).iter().map(exact).collect();
         let start = start.clone().unwrap_or_else(|| Start::Input(first()));
         let run = Run {
             model: &driven,

@@ -92,7 +92,7 @@ mod tests {
         let record = Record::new(run, 1e3, channel("u"), channel("y"), vec![]).unwrap();
         let options = IdentifyOptions {
             delay: Some(0),
-            half_widths: Some(crate::identify::Grid::Count(0)),
+            half_widths: Some(crate::identify::Grid::Count(1)),
             thresholds: Some(crate::identify::Grid::Count(0)),
             ..IdentifyOptions::default()
         };

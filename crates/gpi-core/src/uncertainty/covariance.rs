@@ -164,6 +164,9 @@ impl Uncertainty {
 /// Eigenvalues (descending) and eigenvectors of a symmetric matrix.
 pub(crate) fn descending_eigen(matrix: Matrix) -> (DVector<f64>, Matrix) {
     let n = matrix.nrows();
+    if n == 0 {
+        return (DVector::zeros(0), matrix);
+    }
     if n > CovarianceSettings::default().large
         && let Ok(found) = symmetric_eigen(&matrix)
     {

@@ -81,6 +81,12 @@ impl Refinement {
         &self.estimates.status
     }
 
+    /// Whether history, covariance, residuals and uncertainty bands are there. Model files do not contain them.
+    #[getter]
+    fn complete(&self) -> bool {
+        self.refinement.is_some()
+    }
+
     /// Root mean square residual at the start and after every accepted step, shape (steps + 1,), in the output's unit. Several
     /// outputs are weighted by their residuals.
     #[getter]

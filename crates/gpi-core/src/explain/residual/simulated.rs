@@ -133,7 +133,7 @@ fn decision_threshold_and_p_value_agree() {
 /// The autocorrelation of a residual that is large against noise and small in size has no p-value.
 #[test]
 fn small_correlations_of_a_long_record_pass_without_a_p_value() {
-    let longer: Vec<f64> = (0..25).flat_map(|seed| noise(seed)).collect();
+    let longer: Vec<f64> = (0..25).flat_map(noise).collect();
     let residual = |k: usize| longer[k] + 0.06 * longer[k.saturating_sub(1)];
     let record = |samples: usize| {
         let u: Vec<f64> = drive().into_iter().cycle().take(samples).collect();
