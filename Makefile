@@ -19,7 +19,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # `make test` always runs its checks in the same order, also with `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost scoreboard blind-exam clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -95,6 +95,9 @@ expected-errors: $(NATIVE) ## Print the error that compensate expects beside the
 
 firmware-cost: $(NATIVE) ## Count a compensator's instructions on a Cortex-M4F in QEMU and write docs/firmware.md
 	$(BIN)/python tools/firmware_cost.py --markdown docs/firmware.md
+
+real-records: $(NATIVE) ## Print the held-out errors on measured records next to simple rivals (takes a long time)
+	$(BIN)/python tools/real_records.py --markdown docs/real-records.md
 
 scoreboard: $(NATIVE) ## Print how often `explain` names the right effects (takes a long time)
 	$(BIN)/python tools/scoreboard.py

@@ -10,13 +10,13 @@
 //!
 //! Several effects of one kind are composed in the order of the chain: `w_i = W_2(W_1(r_i, s_1), s_2)` with the speeds
 //! `s_m(k)` that effect m makes of `|u(k) - u(k-1)| rate`, and `q_i = Q_2(r_i, Q_1(r_i, F_i))`. Their derivatives
-//! follow by the chain rule, `dw_i/dr_i = W_2' W_1'` and `dq_i/dF_i = Q_2' Q_1'`, and are what [`Plays::step`] shows of
+//! follow by the chain rule, such as `dw_i/dr_i = W_2' W_1'` and `dq_i/dF_i = Q_2' Q_1'`, and are what [`Plays::step`] shows of
 //! each play.
 //!
 //! Most plays stick at a sample. Their F_i is that of the sample before, whatever their width is now, and so is
 //! `q_i(F_i)`: curves are evaluated for the plays that move only.
 
-use crate::effects::{Effect, PlayCurves, PlayWidths};
+use crate::effects::{Effect, PlayCurves, PlayRead, PlayWidths};
 use crate::operators::play;
 
 /// The plays of one input in motion.
@@ -29,8 +29,8 @@ pub(crate) struct Plays<'a> {
     rate: f64,
     /// F_i.
     pub places: Vec<f64>,
-    /// `q_i(F_i)` and `dq_i/dF_i`; not a number before the first sample.
-    reads: Vec<(f64, f64)>,
+    /// `q_i(F_i)` and its derivatives; not a number before the first sample.
+    reads: Vec<PlayRead>,
 }
 
 /// An effect on half-widths: its place among the effects, its state, and what widths grow with at this sample.
@@ -48,9 +48,8 @@ pub(crate) struct Moved {
     pub place: f64,
     /// `dw_i/dr_i`.
     pub growth: f64,
-    /// `q_i(F_i)` and `dq_i/dF_i`.
-    pub read: f64,
-    pub slope: f64,
+    /// `q_i(F_i)` and its derivatives.
+    pub read: PlayRead,
 }
 
 impl<'a> Plays<'a> {
@@ -73,7 +72,7 @@ impl<'a> Plays<'a> {
             curves: curves.filter(|own| own.input() == input).collect(),
             rate,
             places: vec![0.0; half_widths.len()],
-            reads: vec![(f64::NAN, 0.0); half_widths.len()],
+            reads: vec![PlayRead::plain(f64::NAN); half_widths.len()],
         }
     }
 
@@ -108,18 +107,22 @@ impl<'a> Plays<'a> {
         self.places.iter_mut().zip(places).for_each(|(own, place)| *own = place);
     }
 
-    /// `q_i` and its derivative.
-    fn read(&self, half_width: f64, place: f64) -> (f64, f64) {
-        self.curves.iter().fold((place, 1.0), |(place, slope), curves| {
-            let (place, own) = curves.read(half_width, place);
-            (place, slope * own)
+    /// `q_i` and its derivatives, by the chain rule through all curves.
+    fn read(&self, half_width: f64, place: f64) -> PlayRead {
+        self.curves.iter().fold(PlayRead::plain(place), |inner, curves| {
+            let own = curves.read(half_width, inner.value);
+            PlayRead {
+                value: own.value,
+                by_place: own.by_place * inner.by_place,
+                by_half_width: own.by_half_width + own.by_place * inner.by_half_width,
+            }
         })
     }
 
     /// v of plays that do not move.
     pub(crate) fn held(&self) -> f64 {
         let plays = self.half_widths.iter().zip(self.weights).zip(&self.places);
-        plays.map(|((&r, weight), &place)| weight * self.read(r, place).0).sum()
+        plays.map(|((&r, weight), &place)| weight * self.read(r, place).value).sum()
     }
 
     /// One sample: returns v, and shows `each` play in turn.
@@ -135,13 +138,13 @@ impl<'a> Plays<'a> {
             let before = self.places[i];
             let place = play(width, z, before);
             // most plays stick, and are read the same then
-            if place != before || self.reads[i].0.is_nan() {
+            if place != before || self.reads[i].value.is_nan() {
                 self.places[i] = place;
                 self.reads[i] = self.read(self.half_widths[i], place);
             }
-            let (read, slope) = self.reads[i];
-            v += self.weights[i] * read;
-            each(i, Moved { before, place, growth, read, slope });
+            let read = self.reads[i];
+            v += self.weights[i] * read.value;
+            each(i, Moved { before, place, growth, read });
         }
         v
     }

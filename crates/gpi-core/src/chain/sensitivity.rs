@@ -20,7 +20,7 @@
 //! | weight p_i | `q_i(F_i(k))` |
 //! | slope g_j | `sum_i c_i Z_j(k_i)` |
 //! | threshold eta_j | `sum_i c_i dz/deta_j(k_i)`, where dz/deta_j is `-g_j` if `Z_j != 0` and 0 otherwise; `+g_j` on the falling branch of directional deadzones |
-//! | half-width r_i | `c_i s_i dw_i/dr_i`, s_i = -1 after sliding up, 1 after sliding down |
+//! | half-width r_i | `c_i s_i dw_i/dr_i + p_i dq_i/dr_i`, s_i = -1 after sliding up, 1 after sliding down |
 //! | start s_i | `c_i r_i` until the play first slides, then 0 |
 //!
 //! A start is `F_i(-1) = z(0) + s_i r_i`: it moves with z(0), so that `k_i = 0` for dz, and dF_i/dr_i = s_i, until the
@@ -32,8 +32,7 @@
 //!
 //! The derivatives are exact where no play turns at the sample itself. Turning times shift with the parameters, but F_i
 //! is continuous across a turn, so that the shift adds nothing of first order. A width that depends on the speed of the
-//! drive adds no term, because the speed is a function of the drive alone. One term is left out: where a curve depends
-//! on the half-width itself, `p_i dq_i/dr_i` at a fixed F_i is not part of the derivative by r_i.
+//! drive adds no term, because the speed is a function of the drive alone.
 
 use super::hysteresis::Parameters;
 use super::plays::Plays;
@@ -157,14 +156,15 @@ impl<'a> Sensitivity<'a> {
                     held.copy_from_slice(present);
                 }
             }
-            slopes[i] = moved.slope;
-            output[reads.start + i] = moved.read;
+            slopes[i] = moved.read.by_place;
+            output[reads.start + i] = moved.read.value;
             if self.wanted.half_widths {
-                output[widths.start + i] = weights[i] * moved.slope * directions[i];
+                let by_width = moved.read.by_place * directions[i] + moved.read.by_half_width;
+                output[widths.start + i] = weights[i] * by_width;
             }
             if self.wanted.starts {
                 let reach = if remembers[i] { half_widths[i] } else { 0.0 };
-                output[starts.start + i] = weights[i] * moved.slope * reach;
+                output[starts.start + i] = weights[i] * moved.read.by_place * reach;
             }
         });
         output[0] = v;
@@ -224,12 +224,22 @@ impl<'a> Sensitivity<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::{Effect, HysteresisShape};
     use crate::operators::Operator;
 
     fn run(parameters: &Parameters, start: &[f64], u: &[f64]) -> Vec<Vec<f64>> {
+        run_with(parameters, &[], start, u)
+    }
+
+    fn run_with(
+        parameters: &Parameters,
+        effects: &[Effect],
+        start: &[f64],
+        u: &[f64],
+    ) -> Vec<Vec<f64>> {
         let wanted = Derivatives { thresholds: true, half_widths: true, starts: true };
-        let mut sensitivity =
-            Sensitivity::new(parameters, Some(start), wanted, parameters.plays(&[], 0, 1.0));
+        let plays = parameters.plays(effects, 0, 1.0);
+        let mut sensitivity = Sensitivity::new(parameters, Some(start), wanted, plays);
         let mut row = vec![0.0; Columns::new(parameters, wanted).len];
         u.iter()
             .map(|&value| {
@@ -295,6 +305,43 @@ mod tests {
             let mut moved = parameters.clone();
             moved.thresholds[j] += step;
             compare(1 + 3 + 3 + j, &moved, &start);
+        }
+    }
+
+    #[test]
+    fn curves_that_depend_on_the_half_width_are_in_its_derivative() {
+        let parameters = Parameters {
+            reading: Reading::OneSided,
+            thresholds: vec![0.0],
+            slopes: vec![1.0],
+            half_widths: vec![0.31, 0.8],
+            weights: vec![0.5, 0.7],
+        };
+        let coefficients = vec![0.2, -0.3, 0.1, -0.1, 0.25, 0.4];
+        let shape = HysteresisShape {
+            input: 0,
+            coefficients,
+            widths: 3,
+            middle: 0.1,
+            scale: 2.0,
+            widest: 1.0,
+        };
+        let effects = [Effect::from(shape)];
+        let u: Vec<f64> = (0..300).map(|k| 1.5 * (f64::from(k) * 0.137).sin()).collect();
+        let start = [0.4, -0.3];
+        let rows = run_with(&parameters, &effects, &start, &u);
+        let step = 1e-6;
+        for i in 0..2 {
+            let mut moved = parameters.clone();
+            moved.half_widths[i] += step;
+            let differences = run_with(&moved, &effects, &start, &u);
+            let column = 1 + 2 + 1 + 1 + i;
+            let wrong = rows
+                .iter()
+                .zip(&differences)
+                .filter(|(row, moved)| ((moved[0] - row[0]) / step - row[column]).abs() > 1e-5);
+            let wrong = wrong.count();
+            assert!(wrong <= 2, "half-width {i}: {wrong} samples differ");
         }
     }
 }

@@ -69,7 +69,7 @@ impl OutputStage for Backlash {
         self.output
     }
 
-    /// The latest output; at first the displacement is in the middle of the gap.
+    /// The latest output; at first the end of the gap that is nearest to zero.
     fn rest(&self, first: f64) -> Vec<f64> {
         vec![play(self.half_width, first, 0.0)]
     }

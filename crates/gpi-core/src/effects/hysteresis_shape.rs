@@ -16,7 +16,7 @@
 //! integral of `P_a` from -1 is `(P_{a+1} - P_{a-1}) / (2 a + 1)`.
 
 use super::properties::{FreeOrder, SeparatedBy, Signature};
-use super::{Block, PlayCurves, Proposal, Quantity, Situation, Stage, Units};
+use super::{Block, PlayCurves, PlayRead, Proposal, Quantity, Situation, Stage, Units};
 
 /// Plays F are read through curves: `v = sum_i p_i (F_i + s q((F_i - m) / s, r_i))`, where dq/df is a sum of
 /// products of Legendre polynomials. Its minor loops are not congruent, as those of Preisach operators.
@@ -86,6 +86,19 @@ impl HysteresisShape {
         Self::legendre((2.0 * half_width / self.widest - 1.0).clamp(-1.0, 1.0))
     }
 
+    /// Derivatives by the half-width of the polynomials `by_width`: `P_(n+1)' = P_(n-1)' + (2 n + 1) P_n`.
+    fn growths(&self, half_width: f64, by_width: &[f64; MOST + 2]) -> [f64; MOST + 2] {
+        let mut slopes = [0.0; MOST + 2];
+        if half_width < self.widest {
+            slopes[1] = 2.0 / self.widest;
+            for n in 1..=MOST {
+                let own = (2 * n + 1) as f64 * by_width[n];
+                slopes[n + 1] = slopes[n - 1] + own * 2.0 / self.widest;
+            }
+        }
+        slopes
+    }
+
     /// The integral of P_a from -1, and P_a itself, at the value `place` of a play.
     fn by_place(&self, place: f64) -> impl Iterator<Item = (f64, f64)> {
         let f = (place - self.middle) / self.scale;
@@ -137,20 +150,23 @@ impl PlayCurves for HysteresisShape {
         self.input
     }
 
-    fn read(&self, half_width: f64, place: f64) -> (f64, f64) {
+    fn read(&self, half_width: f64, place: f64) -> PlayRead {
+        let mut read = PlayRead::plain(place);
         if half_width == 0.0 {
-            return (place, 1.0);
+            return read;
         }
         let by_width = self.by_width(half_width);
-        let (mut curve, mut density) = (0.0, 0.0);
+        let growths = self.growths(half_width, &by_width);
         for (row, (integral, own)) in
             self.coefficients.chunks_exact(self.widths).zip(self.by_place(place))
         {
-            let weight: f64 = row.iter().zip(&by_width).map(|(c, p)| c * p).sum();
-            curve += weight * integral;
-            density += weight * own;
+            let sum = |factors: &[f64]| row.iter().zip(factors).map(|(c, p)| c * p).sum::<f64>();
+            let weight = sum(&by_width);
+            read.value += self.scale * weight * integral;
+            read.by_place += weight * own;
+            read.by_half_width += self.scale * sum(&growths) * integral;
         }
-        (place + self.scale * curve, 1.0 + density)
+        read
     }
 
     fn read_slopes(&self, half_width: f64, place: f64, weight: f64, slopes: &mut [f64]) {

@@ -19,7 +19,7 @@ pub use block::Block;
 pub use inner_loop::{InnerLoop, Law, Sees};
 pub use place::{
     Added, ClosedLoops, Coefficients, Finding, InputStage, Moment, OutputStage, ParallelSections,
-    Place, PlaceMut, PlayCurves, PlayWidths, Slope, Stage,
+    Place, PlaceMut, PlayCurves, PlayRead, PlayWidths, Slope, Stage,
 };
 pub use properties::{FreeOrder, SeparatedBy, Signature};
 pub use quantity::{Quantity, Units};

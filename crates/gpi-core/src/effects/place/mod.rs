@@ -18,7 +18,7 @@ mod plays;
 pub use dynamics::{ClosedLoops, Coefficients, ParallelSections};
 pub use input::InputStage;
 pub use output::{Added, Moment, OutputStage, Slope};
-pub use plays::{PlayCurves, PlayWidths};
+pub use plays::{PlayCurves, PlayRead, PlayWidths};
 
 use super::block::Block;
 use super::quantity::{Quantity, Units};
