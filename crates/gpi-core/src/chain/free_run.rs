@@ -22,7 +22,7 @@ use super::stages::Stages;
 use super::stream::hats;
 use crate::chain::hysteresis::Parameters;
 use crate::effects::{ClosedLoops, InnerLoop, PlayCurves, Stage};
-use crate::linear::Sections;
+use crate::linear::{Section, Sections};
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::RowDVector;
 use rayon::prelude::*;
@@ -32,6 +32,17 @@ impl Point {
     pub(crate) fn replace_dynamics(&mut self, dynamics: Sections) {
         self.splice_states(0..self.dynamics.order(), &vec![0.0; dynamics.order()]);
         self.dynamics = dynamics;
+    }
+
+    /// The same with a section of G that contributes nothing to the output.
+    pub(crate) fn without_output_of(&self, section: usize) -> Self {
+        let mut point = self.clone();
+        let before: usize = point.dynamics.sections[..section].iter().map(Section::order).sum();
+        let own = &mut point.dynamics.sections[section];
+        own.b.fill(0.0);
+        let order = own.order();
+        point.splice_states(before..before + order, &vec![0.0; order]);
+        point
     }
 
     /// The stages before the hysteresis and after the dynamics.

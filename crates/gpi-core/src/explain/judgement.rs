@@ -112,6 +112,8 @@ pub(super) enum Refusal {
     Insubstantial,
     /// No machine has such values.
     Impossible,
+    /// A mode that follows a line, creep or a disturbance.
+    NotAMode,
     /// The rest of the model can do the same.
     NotItsOwn,
     /// It does not predict gaps between its knots.
@@ -137,6 +139,9 @@ impl Refusal {
                 "removes too small a part of the residual, which is far above the noise".to_owned()
             }
             Self::Impossible => "would need values that no machine has".to_owned(),
+            Self::NotAMode => {
+                "would follow a line, creep or a disturbance, which the input does not drive".to_owned()
+            }
             Self::NotItsOwn => "does nothing that the rest of the model cannot do".to_owned(),
             Self::Gaps => "does not predict gaps between its knots as well as it fits".to_owned(),
             Self::TooLarge => {

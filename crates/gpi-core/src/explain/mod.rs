@@ -106,7 +106,6 @@ pub fn explain(
     let measured = as_measured(&prepared.record, record, &prepared.means)?;
     let mut refined = compare(&mut prepared, &identify, true, progress)?.refined;
     refined.drop_undetermined(&prepared, progress)?;
-    let base = refined.fitted.point.clone();
     let order_is_given = identify.order.is_some() || identify.delay.is_some();
     // none at all is a grid too
     let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_) | Grid::Count(0)));
@@ -120,6 +119,10 @@ pub fn explain(
         SearchSetup::new(&prepared, weights, measured, allowed, order_is_given, moving, policy)?;
     let mut state = SearchState::new(&setup, prepared, &refined);
     state.repair()?;
+    revision::shed_lines(&mut state, progress)?;
+    let base = state.point.clone();
+    // the last fit of the declared model may have led a pole to creep
+    revision::shed_lags(&mut state, progress)?;
     let mut interrupted = is_interrupted(search::run(&mut state, progress))?;
     revision::settle_lags(&mut state)?;
     for entry in required {

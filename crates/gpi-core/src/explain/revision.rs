@@ -10,6 +10,7 @@
 //! | a driven effect replaces a slow function of time | `lost` < threshold of the slow one, `T_driven < f T_slow`, plausible values |
 //! | a slow function of time replaces another | `J_other < (1 - f) J` |
 //! | an effect replaces slow poles of G | `J_effect <= f J_poles` at the end of the search, else the poles return |
+//! | a mode of G that follows a line, or rings on, is taken out | always ([`crate::fit::line_modes`]) |
 //!
 //! An effect that was accepted early, with little else in the model, has often taken what belongs to a later one. The
 //! first decision is therefore made after each addition. The dropped effect may have moved the newest one far from
@@ -24,11 +25,11 @@ use super::state::{Addition, BeforeLags, SearchState, Trial};
 use super::trial::{fitted, measured, start};
 use crate::Error;
 use crate::Progress;
-use crate::chain::point::Point;
-use crate::effects::{CATALOGUE, Effect, Entry, FreeOrder, Place, Signature};
+use crate::effects::{CATALOGUE, Entry, FreeOrder, Place, Signature};
+use crate::fit::line_modes::{is_same, line_modes};
 use crate::fit::memory::Memory;
 use crate::fit::minimize::{FitOptions, Fitted};
-use crate::fit::preparation::rescale;
+use nalgebra::Complex;
 
 /// Moves added signals to the other side of the output stage where that explains more.
 pub(super) fn rearrange(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
@@ -173,15 +174,6 @@ pub(super) fn exchange_slow(state: &mut SearchState, progress: Progress) -> Resu
     Ok(())
 }
 
-/// Makes modes that were found parts of G.
-pub(super) fn join_modes(point: &mut Point) {
-    let joins = |effect: &Effect| effect.entry().free_order == FreeOrder::JoinsG;
-    while let Some(place) = point.effects.iter().position(joins) {
-        *point = point.with_effect_in_dynamics(place);
-    }
-    rescale(point);
-}
-
 /// Takes slow poles out of G that came when something else was fitted, so that the next round can name the effect that
 /// hides in them; says whether there were any.
 pub(super) fn shed_lags(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
@@ -199,6 +191,24 @@ pub(super) fn shed_lags(state: &mut SearchState, progress: Progress) -> Result<b
     let additions = state.additions.len();
     state.before_lags = Some(BeforeLags { point: before, cost: state.cost, additions });
     state.cost = fitted.linearization.cost;
+    state.is_rich = false;
+    Ok(true)
+}
+
+/// Takes modes out of G that follow a line of the mains or ring for a large part of the record, so that the next round can name it; says whether there were any.
+pub(super) fn shed_lines(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    if state.setup.order_is_given {
+        return Ok(false);
+    }
+    let lines = line_modes(&state.point, &state.prepared.record)?;
+    let memory = Memory::of(&state.prepared.record);
+    let is_line = |pole: &Complex<f64>| {
+        let rings_on = pole.im != 0.0 && memory.is_disturbance(pole);
+        rings_on || lines.iter().any(|line| is_same(line, pole))
+    };
+    let Some(point) = state.point.without(is_line)? else { return Ok(false) };
+    let fitted = state.fit(point, &state.setup.options, "lines", progress)?;
+    (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
     state.is_rich = false;
     Ok(true)
 }

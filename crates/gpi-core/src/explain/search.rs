@@ -5,11 +5,11 @@ use super::grid::refine_grids;
 use super::judgement::{Evidence, Refusal, choose, refusal};
 use super::ranking::{ranked, scored_beside};
 use super::revision::{
-    drop_superfluous, exchange_slow, join_modes, prefer_driven, rearrange, shed_lags,
+    drop_superfluous, exchange_slow, prefer_driven, rearrange, shed_lags, shed_lines,
 };
 use super::setup::SearchSetup;
 use super::state::{Addition, Rejected, SearchState, Trial};
-use super::trial::{trial, trials as trials_of};
+use super::trial::{join_modes, trial, trials as trials_of};
 use crate::Error;
 use crate::effects::{Entry, FreeOrder, Signature, Stage};
 use crate::fit::minimize::Fitted;
@@ -31,7 +31,9 @@ pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Err
 /// Adds effects until nothing more is confirmed.
 fn add_effects(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
     for _ in 0..state.setup.policy.revision.rounds {
-        if !round(state, progress)? && !shed_lags(state, progress)? {
+        // a finer grid or a longer fit may have led a mode to a line
+        if !round(state, progress)? && !shed_lines(state, progress)? && !shed_lags(state, progress)?
+        {
             break;
         }
     }

@@ -29,9 +29,10 @@ use super::state::{SearchState, Trial};
 use crate::Error;
 use crate::Progress;
 use crate::chain::point::Point;
-use crate::effects::{ClosedLoops, Entry, Stage};
+use crate::effects::{ClosedLoops, Effect, Entry, FreeOrder, Stage};
 use crate::fit::joint::Refined;
 use crate::fit::minimize::{FitOptions, Fitted};
+use crate::fit::preparation::rescale;
 use crate::optimize::Status;
 
 /// What a candidate became, or why its fit failed.
@@ -123,6 +124,15 @@ pub(super) fn start(state: &SearchState, base: &Point, score: Score) -> Result<P
     let squares = |point| state.training_squares(point);
     let is_near = squares(&start)? <= most * squares(base)?;
     Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })
+}
+
+/// Makes modes that were found parts of G.
+pub(super) fn join_modes(point: &mut Point) {
+    let joins = |effect: &Effect| effect.entry().free_order == FreeOrder::JoinsG;
+    while let Some(place) = point.effects.iter().position(joins) {
+        *point = point.with_effect_in_dynamics(place);
+    }
+    rescale(point);
 }
 
 /// What a fit brought over the present model; `without` is what the effect was added to.

@@ -4,7 +4,7 @@ use crate::chain::point::Point;
 use crate::effects::longest_lag;
 use crate::fit::preparation::rescale;
 use crate::fit::settings::MemorySettings;
-use crate::linear::Sections;
+use crate::linear::{Section, Sections};
 use crate::{Error, Record};
 use nalgebra::Complex;
 
@@ -28,10 +28,14 @@ impl Memory {
         pole.im == 0.0 && pole.re > 0.0 && -1.0 / pole.re.ln() > self.lag
     }
 
-    /// Whether a pole is as slow as creep or a disturbance, `-1 / ln|pole|` its time constant.
+    /// Whether a pole is as slow as a disturbance, `-1 / ln|pole|` its time constant.
+    pub(crate) fn is_disturbance(&self, pole: &Complex<f64>) -> bool {
+        -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln() >= self.longest
+    }
+
+    /// Whether a pole is as slow as creep or a disturbance.
     pub(crate) fn is_exceeded_by(&self, pole: &Complex<f64>) -> bool {
-        let memory = -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln();
-        memory >= self.longest || self.is_slow_lag(pole)
+        self.is_disturbance(pole) || self.is_slow_lag(pole)
     }
 }
 
@@ -47,7 +51,18 @@ impl Point {
             return Ok(None);
         }
         let mut dynamics = Sections::from_delayed_state_space(&own.to_state_space()?)?;
-        dynamics.sections.retain(|section| !section.poles().iter().all(&unwanted));
+        let kept = |section: Section| {
+            let poles = section.poles();
+            let wanted: Vec<Complex<f64>> =
+                poles.iter().copied().filter(|pole| !unwanted(pole)).collect();
+            match wanted[..] {
+                [] => None,
+                // one of two real poles
+                [pole] if poles.len() == 2 => Some(section.part(pole.re)),
+                _ => Some(section),
+            }
+        };
+        dynamics.sections = dynamics.sections.into_iter().filter_map(kept).collect();
         if dynamics.sections.is_empty() || dynamics.poles().iter().any(unwanted) {
             return Ok(None);
         }

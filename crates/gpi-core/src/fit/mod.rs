@@ -22,6 +22,7 @@ mod grid;
 pub(crate) mod hysteresis;
 mod initial_state;
 pub(crate) mod joint;
+pub(crate) mod line_modes;
 pub(crate) mod memory;
 pub(crate) mod minimize;
 mod misfit;

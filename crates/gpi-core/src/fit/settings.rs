@@ -23,6 +23,7 @@ pub(crate) struct FitSettings {
     pub representatives: RepresentativeSettings,
     /// How long the memory of a stage's dynamics may be; a search uses the defaults.
     pub memory: MemorySettings,
+    pub line_modes: LineModeSettings,
 }
 
 impl FitSettings {
@@ -39,7 +40,8 @@ impl FitSettings {
         self.simplification.validate()?;
         self.initial_state.validate()?;
         self.representatives.validate()?;
-        self.memory.validate()
+        self.memory.validate()?;
+        self.line_modes.validate()
     }
 }
 
@@ -147,6 +149,21 @@ settings! {
     struct MemorySettings {
         /// Part of the longest experiment: a slower pole follows a disturbance. By hand.
         part: f64 = 0.05, PART;
+    }
+
+    /// Which modes of G are examined for following a line, and the lines that are tried.
+    struct LineModeSettings {
+        /// Time constant of a mode over the length of the longest experiment, at least: a mode that decays faster follows no
+        /// line that the input does not contain. By hand.
+        part: f64 = 0.005, PART;
+        /// Angles of lines on each side of the pole's, in half-widths `-ln|p|` of its resonance.
+        reach: f64 = 2.0, POSITIVE;
+        /// The same in bins of the spectrum of the longest experiment, at least.
+        bins: f64 = 2.0, POSITIVE;
+        /// Distance of the angles in such bins: half of it away from a line, a sine explains 96 % of it.
+        step: f64 = 0.25, POSITIVE;
+        /// Halvings of that distance, for an angle that a sine over the whole record needs.
+        halvings: usize = 10, FROM_ONE;
     }
 
     /// The part of a residual that is not white noise.

@@ -16,12 +16,33 @@ use crate::chain::point::Point;
 use crate::effects::longest_lag;
 use crate::fit::RefineOptions;
 use crate::fit::joint::{Refined, joint};
+use crate::fit::line_modes::{is_same, line_modes};
 use crate::fit::memory::Memory;
 use crate::fit::preparation::Prepared;
 use crate::identify::identification::Candidate;
 use crate::identify::settings::StructurePolicy;
 use crate::progress::Progress;
+use nalgebra::Complex;
 use std::f64::consts::PI;
+
+/// What a candidate became.
+struct Tried {
+    refined: Refined,
+    /// Samples of white noise that a parameter takes from its residual.
+    samples: f64,
+    /// Poles that rule it out: they follow creep, a disturbance or a line of the mains instead of the input.
+    unwanted: Vec<Complex<f64>>,
+}
+
+impl Tried {
+    fn is_usable(&self) -> bool {
+        self.unwanted.is_empty()
+    }
+
+    fn point(&self) -> &Point {
+        &self.refined.fitted.point
+    }
+}
 
 /// Refines structures and compares them.
 pub(super) struct Comparison<'a> {
@@ -32,8 +53,8 @@ pub(super) struct Comparison<'a> {
     /// creep and disturbances.
     fast: bool,
     candidates: Vec<Candidate>,
-    /// What each candidate became, and the samples of white noise that a parameter takes from its residual.
-    refined: Vec<(Refined, f64)>,
+    /// What each candidate became.
+    refined: Vec<Tried>,
     /// Why candidates were dropped whose computation failed, and whether the last one was.
     failures: Vec<Error>,
     has_failed: bool,
@@ -85,8 +106,8 @@ impl<'a> Comparison<'a> {
     }
 
     fn refine(&mut self, point: Point, progress: Progress) -> Result<bool, Error> {
-        let usable = self.refined.iter().filter(|(refined, _)| self.is_usable(refined));
-        let costs = usable.map(|(refined, _)| refined.fitted.linearization.cost);
+        let usable = self.refined.iter().filter(|tried| tried.is_usable());
+        let costs = usable.map(|tried| tried.refined.fitted.linearization.cost);
         let hopeless = self.policy.hopeless * costs.fold(f64::INFINITY, f64::min);
         let refined = joint(point, self.prepared, &self.options, hopeless, self.fast, progress)?;
         // a model of it must exist
@@ -105,7 +126,8 @@ impl<'a> Comparison<'a> {
             criterion: 0.0,
         });
         let samples = (uncertainty.used / parameters.max(1) as f64).max(1.0);
-        self.refined.push((refined, samples));
+        let unwanted = self.unwanted(point)?;
+        self.refined.push(Tried { refined, samples, unwanted });
         self.compare();
         Ok(self.chosen() == Some(self.candidates.len() - 1))
     }
@@ -113,12 +135,12 @@ impl<'a> Comparison<'a> {
     /// Works the criteria out, with the autocorrelation of the smallest residual.
     fn compare(&mut self) {
         let values = self.prepared.values();
-        let samples = self.closest().map_or(1.0, |place| self.refined[place].1);
-        let usable: Vec<bool> = self.refined.iter().map(|(r, _)| self.is_usable(r)).collect();
-        for (candidate, usable) in self.candidates.iter_mut().zip(usable) {
+        let samples = self.closest().map_or(1.0, |place| self.refined[place].samples);
+        for (candidate, tried) in self.candidates.iter_mut().zip(&self.refined) {
             let deviance = 2.0 * values * candidate.rms.max(f64::MIN_POSITIVE).ln();
             candidate.used = samples * candidate.parameters as f64;
-            let penalty = if usable { candidate.used * values.ln() } else { f64::INFINITY };
+            let penalty =
+                if tried.is_usable() { candidate.used * values.ln() } else { f64::INFINITY };
             candidate.criterion = deviance + penalty;
         }
     }
@@ -130,7 +152,7 @@ impl<'a> Comparison<'a> {
             return false;
         }
         let Some(best) = self.closest() else { return !self.failures.is_empty() };
-        let dynamics = &self.refined[best].0.fitted.point.dynamics;
+        let dynamics = &self.refined[best].point().dynamics;
         // twice the corner of the longest lag that is dynamics
         let lowest = (2.0 / longest_lag(self.prepared.record.rate())).min(1.0);
         let frequency = |i: usize| lowest * (PI / lowest).powf(i as f64 / frequencies as f64);
@@ -147,15 +169,13 @@ impl<'a> Comparison<'a> {
 
     /// Whether any candidate is usable.
     pub(super) fn has_usable(&self) -> bool {
-        self.refined.iter().any(|(refined, _)| self.is_usable(refined))
+        self.refined.iter().any(Tried::is_usable)
     }
 
     /// Withdraws the last candidate where a pole of it is slower than `slowest`.
     pub(super) fn withdraw_slow(&mut self, slowest: f64) {
-        let is_slow = |(refined, _): &(Refined, f64)| {
-            let poles = refined.fitted.point.dynamics.poles();
-            poles.iter().any(|pole| pole.norm() > slowest)
-        };
+        let is_slow =
+            |tried: &Tried| tried.point().dynamics.poles().iter().any(|pole| pole.norm() > slowest);
         if self.refined.last().is_some_and(is_slow) {
             self.refined.pop();
             self.candidates.pop();
@@ -164,17 +184,21 @@ impl<'a> Comparison<'a> {
     }
 
     /// The best fit of all without the poles that rule it out, where there is one.
-    pub(super) fn without_slow_poles(&self) -> Result<Option<Point>, Error> {
-        let Some(place) = self.closest().filter(|_| self.fast) else { return Ok(None) };
-        let memory = Memory::of(&self.prepared.record);
-        let point = &self.refined[place].0.fitted.point;
-        point.without(|pole| memory.is_exceeded_by(pole))
+    pub(super) fn without_unwanted_poles(&self) -> Result<Option<Point>, Error> {
+        let Some(place) = self.closest() else { return Ok(None) };
+        let Tried { unwanted, .. } = &self.refined[place];
+        self.refined[place].point().without(|pole| unwanted.iter().any(|own| is_same(own, pole)))
     }
 
-    fn is_usable(&self, refined: &Refined) -> bool {
-        let memory = Memory::of(&self.prepared.record);
-        let poles = refined.fitted.point.dynamics.poles();
-        !self.fast || !poles.iter().any(|pole| memory.is_exceeded_by(pole))
+    /// The poles that rule a point out.
+    fn unwanted(&self, point: &Point) -> Result<Vec<Complex<f64>>, Error> {
+        let mut unwanted = line_modes(point, &self.prepared.record)?;
+        if self.fast {
+            let memory = Memory::of(&self.prepared.record);
+            let poles = point.dynamics.poles();
+            unwanted.extend(poles.into_iter().filter(|pole| memory.is_exceeded_by(pole)));
+        }
+        Ok(unwanted)
     }
 
     /// The place of the candidate with the least residual, usable or not.
@@ -191,12 +215,12 @@ impl<'a> Comparison<'a> {
 
     /// The refined point of the best candidate.
     pub(super) fn best(&self) -> Option<&Point> {
-        self.chosen().map(|place| &self.refined[place].0.fitted.point)
+        self.chosen().map(|place| self.refined[place].point())
     }
 
     /// The best candidate's place and what it became, and all candidates.
     pub(super) fn finish(mut self) -> Option<(usize, Refined, Vec<Candidate>)> {
         let chosen = self.chosen()?;
-        Some((chosen, self.refined.swap_remove(chosen).0, self.candidates))
+        Some((chosen, self.refined.swap_remove(chosen).refined, self.candidates))
     }
 }

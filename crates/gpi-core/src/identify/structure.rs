@@ -168,7 +168,7 @@ impl<'a> StructureSearch<'a> {
     /// Tries the best fit of all without the poles that rule it out: a lower order drops the weakest mode
     /// instead, which may be the stage's own resonance.
     pub(super) fn shed(&mut self, progress: Progress) -> Result<(), Error> {
-        if let Ok(Some(point)) = self.comparison.without_slow_poles() {
+        if let Ok(Some(point)) = self.comparison.without_unwanted_poles() {
             self.comparison.offer(point, progress)?;
         }
         Ok(())

@@ -101,6 +101,19 @@ impl Section {
         states
     }
 
+    /// The term of the partial fractions that belongs to one of two real poles p, of which q is the other:
+    /// `((p b1 + b2) / (p - q)) / (z - p)` at the reference output, seen by the others as `c (1, -q)'`.
+    pub(crate) fn part(&self, p: f64) -> Self {
+        let q = -self.a[0] - p;
+        let b = (self.b.row(0) * p + self.b.row(1)) / (p - q);
+        let c = self.c.column(0) - self.c.column(1) * q;
+        let (b, c) = (
+            Matrix::from_row_slice(1, b.len(), b.as_slice()),
+            Matrix::from_column_slice(c.len(), 1, c.as_slice()),
+        );
+        Self { a: vec![-p], b, c, reference: self.reference }
+    }
+
     pub(crate) fn is_stable(&self) -> bool {
         is_stable(&self.a)
     }
@@ -149,5 +162,36 @@ impl Section {
         }
         c.set_row(reference, &nalgebra::RowDVector::from_vec(vec![1.0, 0.0]));
         Self { a, b, c, reference }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_real_poles_are_the_sum_of_their_parts() {
+        let (p, q) = (0.9, -0.4);
+        let whole = Section {
+            a: vec![-(p + q), p * q],
+            b: Matrix::from_row_slice(2, 1, &[0.3, -0.2]),
+            c: Matrix::from_row_slice(2, 2, &[1.0, 0.0, 0.7, 0.5]),
+            reference: 0,
+        };
+        let parts = [whole.part(p), whole.part(q)];
+        let impulse = |section: &Section| {
+            let mut state = section.b.column(0).into_owned();
+            let output = |_| {
+                let y = &section.c * &state;
+                state = section.matrix() * &state;
+                y
+            };
+            (0..8).map(output).collect::<Vec<_>>()
+        };
+        for ((y, one), two) in
+            impulse(&whole).iter().zip(impulse(&parts[0])).zip(impulse(&parts[1]))
+        {
+            assert!((y - (one + two)).amax() < 1e-14, "{y}");
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! else. Before its effect is named it must also pass the following.
 //!
 //! 1. *Possible*: its values are such as a machine can have ([`Block::is_possible`]).
+//!    A mode does not follow a line, creep or a disturbance ([`crate::fit::line_modes`], [`crate::fit::memory`]).
 //! 2. *Not a longer fit*: the model without it, fitted again from where the trial ended, does worse by more than chance.
 //!
 //! More is asked of every effect when the search has ended. Before that, another effect that is not found yet would make
@@ -24,9 +25,11 @@ mod size;
 
 use super::judgement::{Evidence, Refusal, judge};
 use super::state::{SearchState, Trial};
-use super::trial::fitted;
+use super::trial::{fitted, join_modes};
 use crate::chain::point::Point;
-use crate::effects::{Block, Effect, Signature};
+use crate::effects::{Block, Effect, FreeOrder, Signature};
+use crate::fit::line_modes::line_modes;
+use crate::fit::memory::Memory;
 use crate::fit::minimize::Fitted;
 use crate::{Error, Progress};
 
@@ -51,8 +54,13 @@ pub(super) fn examine(
     // what is refused may have shown the way to a better model without it
     let (without, _) = fitted(state, trial.point.without_effect(place), trial.entry, progress)?;
     let cost = without.linearization.cost;
-    let is_possible = is_possible(&trial.point.effects[place]);
-    let refusal = (!is_possible).then_some(Refusal::Impossible);
+    let refusal = if !is_possible(&trial.point.effects[place]) {
+        Some(Refusal::Impossible)
+    } else if !is_mode(state, trial)? {
+        Some(Refusal::NotAMode)
+    } else {
+        None
+    };
     if cost >= (1.0 - state.setup.policy.examination.better) * state.cost {
         return Ok(Examination { refusal, without: None });
     }
@@ -100,6 +108,21 @@ fn is_needed(state: &SearchState, place: usize, progress: Progress) -> Result<bo
     let fitted = state.fit(without, &state.setup.options, "without it", progress)?;
     let least = 1.0 + state.setup.policy.judgement.least;
     Ok(fitted.linearization.cost > least * state.cost)
+}
+
+/// Whether the input drives a mode that is to be a part of G, and all others that the trial has moved.
+fn is_mode(state: &SearchState, trial: &Trial) -> Result<bool, Error> {
+    if trial.entry.free_order != FreeOrder::JoinsG || state.setup.order_is_given {
+        return Ok(true);
+    }
+    let mut joined = trial.point.clone();
+    join_modes(&mut joined);
+    let record = &state.prepared.record;
+    let memory = Memory::of(record);
+    let slow = |point: &Point| {
+        point.dynamics.poles().iter().filter(|pole| memory.is_exceeded_by(pole)).count()
+    };
+    Ok(slow(&joined) <= slow(&state.point) && line_modes(&joined, record)?.is_empty())
 }
 
 fn is_possible(effect: &Effect) -> bool {
