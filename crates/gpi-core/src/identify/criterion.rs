@@ -10,6 +10,11 @@
 //! ```
 //!
 //! with one c for all candidates, that of the smallest residual, which is closest to the noise itself.
+//!
+//! One c is too much for parameters of fast dynamics in slow noise, which hardly hides them. Of the candidates with the same
+//! hysteresis as the best one and no larger residual, the one is therefore taken with the least `N ln w^2 + p ln N`, w the
+//! root mean square innovation of the residual's own autoregression ([`NoiseModel`]). The numbers of plays are not chosen
+//! so: an autoregression follows the slow residual that a coarse hysteresis leaves.
 
 use crate::Error;
 use crate::chain::point::Point;
@@ -22,6 +27,7 @@ use crate::fit::preparation::Prepared;
 use crate::identify::identification::Candidate;
 use crate::identify::settings::StructurePolicy;
 use crate::progress::Progress;
+use crate::uncertainty::noise_model::NoiseModel;
 use nalgebra::Complex;
 use std::f64::consts::PI;
 
@@ -30,6 +36,8 @@ struct Tried {
     refined: Refined,
     /// Samples of white noise that a parameter takes from its residual.
     samples: f64,
+    /// `N ln w^2 + p ln N`, w the innovations of its residual.
+    whitened: f64,
     /// Poles that rule it out: they follow creep, a disturbance or a line of the mains instead of the input.
     unwanted: Vec<Complex<f64>>,
 }
@@ -127,7 +135,8 @@ impl<'a> Comparison<'a> {
         });
         let samples = (uncertainty.used / parameters.max(1) as f64).max(1.0);
         let unwanted = self.unwanted(point)?;
-        self.refined.push(Tried { refined, samples, unwanted });
+        let whitened = self.whitened(point, parameters)?;
+        self.refined.push(Tried { refined, samples, whitened, unwanted });
         self.compare();
         Ok(self.chosen() == Some(self.candidates.len() - 1))
     }
@@ -190,6 +199,15 @@ impl<'a> Comparison<'a> {
         self.refined[place].point().without(|pole| unwanted.iter().any(|own| is_same(own, pole)))
     }
 
+    /// `N ln w^2 + p ln N` over all outputs.
+    fn whitened(&self, point: &Point, parameters: usize) -> Result<f64, Error> {
+        let record = &self.prepared.record;
+        let innovations = NoiseModel::of(&point.residuals(record)?, record).innovations;
+        let logarithms = innovations.diagonal().map(|square| square.max(f64::MIN_POSITIVE).ln());
+        let penalty = parameters as f64 * self.prepared.values().ln();
+        Ok(record.scored() as f64 * logarithms.sum() + penalty)
+    }
+
     /// The poles that rule a point out.
     fn unwanted(&self, point: &Point) -> Result<Vec<Complex<f64>>, Error> {
         let mut unwanted = line_modes(point, &self.prepared.record)?;
@@ -207,10 +225,19 @@ impl<'a> Comparison<'a> {
         (0..self.candidates.len()).min_by(|&i, &j| rms(i).total_cmp(&rms(j)))
     }
 
-    /// The place of the candidate with the least criterion.
+    /// The place of the best candidate.
     fn chosen(&self) -> Option<usize> {
         let criterion = |i: usize| self.candidates[i].criterion;
-        (0..self.candidates.len()).min_by(|&i, &j| criterion(i).total_cmp(&criterion(j)))
+        let places = 0..self.candidates.len();
+        let best = places.clone().min_by(|&i, &j| criterion(i).total_cmp(&criterion(j)))?;
+        let own = &self.candidates[best];
+        let is_rival = |&place: &usize| {
+            let other = &self.candidates[place];
+            let is_alike = (other.plays, other.deadzones) == (own.plays, own.deadzones);
+            self.refined[place].is_usable() && is_alike && other.rms <= own.rms
+        };
+        let whitened = |place: usize| self.refined[place].whitened;
+        places.filter(is_rival).min_by(|&i, &j| whitened(i).total_cmp(&whitened(j))).or(Some(best))
     }
 
     /// The refined point of the best candidate.
