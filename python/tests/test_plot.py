@@ -176,7 +176,7 @@ def test_every_candidate_is_drawn_and_the_chosen_one_marked(model: gpi.Model) ->
     ax = gpi.plot.candidates(model)
     points, ring = ax.lines
     np.testing.assert_allclose(points.get_xdata(), [row["used"] for row in rows])
-    assert points.get_ydata().min() == 0
+    assert np.nanmin(points.get_ydata()) == 0
     [chosen] = [row for row in rows if row["chosen"]]
     assert list(ring.get_xdata()) == [chosen["used"]]
     *_, text = (text.get_text() for text in ax.get_legend().get_texts())

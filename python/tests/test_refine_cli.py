@@ -63,7 +63,11 @@ def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, An
 
 def test_the_structure_is_the_best_of_the_candidates(result: dict[str, Any]) -> None:
     [chosen] = [row for row in result["candidates"] if row["chosen"]]
-    assert chosen["criterion"] == min(row["criterion"] for row in result["candidates"])
+    allowed = [row for row in result["candidates"] if row["criterion"] is not None]
+    best = min(allowed, key=lambda row: row["criterion"])
+    # of those with the same hysteresis, the model of the noise chooses the order
+    assert (chosen["plays"], chosen["deadzones"]) == (best["plays"], best["deadzones"])
+    assert chosen["rms"] <= best["rms"]
     assert result["delay"] == chosen["delay"]
     assert set(chosen) >= {"order", "plays", "deadzones", "rms", "used"}
 

@@ -7,10 +7,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// String literals that equal an effect's name and mean something else: an option, and a residual test.
-const OTHER_MEANINGS: [(&str, &str); 3] = [
+const OTHER_MEANINGS: [(&str, &str); 4] = [
     ("identify/quasi_static.rs", "delay"),
     ("explain/residual/outcome.rs", "outliers"),
     ("explain/residual/wrong_samples.rs", "outliers"),
+    ("explain/residual/simulated.rs", "outliers"),
 ];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {

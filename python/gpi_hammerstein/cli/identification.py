@@ -147,14 +147,14 @@ def candidate_table(candidates: Sequence[Mapping[str, Any]], unit: str) -> Table
         "criterion minus best",
     ):
         table.add_column(escape(name), justify="right")
-    best = min(row["criterion"] for row in candidates)
+    best = min((row["criterion"] for row in candidates if row["criterion"] is not None), default=0.0)
     for row in candidates:
         table.add_row(
             "*" if row["chosen"] else "",
             *(str(row[name]) for name in ("order", "plays", "deadzones", "delay")),
             f"{row['rms']:.4g}",
             f"{row['used']:.0f}",
-            f"{row['criterion'] - best:.0f}",
+            "ruled out" if row["criterion"] is None else f"{row['criterion'] - best:.0f}",
             style="bold" if row["chosen"] else None,
         )
     return table

@@ -48,11 +48,13 @@ def candidates(found: Model | Identification, ax: Axes | None = None) -> Axes:
         say_nothing_to_draw(ax, "no structures: the model is not from identify")
         return ax
     used = np.array([row["used"] for row in rows])
-    criterion = np.array([row["criterion"] for row in rows])
-    above = criterion - criterion.min()
+    # structures that are ruled out have no criterion
+    known_criteria = [row["criterion"] for row in rows if row["criterion"] is not None]
+    least = min(known_criteria, default=0.0)
+    above = np.array([np.nan if row["criterion"] is None else row["criterion"] - least for row in rows])
     # Other structures may be tens of thousands above the best one, with up to four times the parameters.
     ax.set_yscale("symlog", linthresh=10.0)
-    ax.set_ylim(-3.0, 10 * max(10.0, float(above.max())))
+    ax.set_ylim(-3.0, 10 * max([10.0, *(value - least for value in known_criteria)]))
     ax.set_xscale("log")
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.xaxis.set_major_formatter(ScalarFormatter())

@@ -71,7 +71,8 @@ impl Identification {
     ///
     /// Rows of ``delay``, ``order``, ``plays``, ``deadzones``, ``rms`` (in the output's unit), ``parameters`` (their number),
     /// ``used`` (their effective number, corrected for the residual's autocorrelation), ``criterion`` (BIC, ``N ln rms^2 +
-    /// used ln N``; the smallest is chosen), ``chosen``.
+    /// used ln N``; None for a structure that is ruled out because a mode follows a line of the mains), ``chosen``. Of the
+    /// structures with the same hysteresis as the one with the smallest criterion, the model of the noise chooses the order.
     #[getter]
     fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let row = |(place, candidate): (usize, &core::Candidate)| {
@@ -83,7 +84,8 @@ impl Identification {
             row.set_item("rms", candidate.rms)?;
             row.set_item("parameters", candidate.parameters)?;
             row.set_item("used", candidate.used)?;
-            row.set_item("criterion", candidate.criterion)?;
+            let criterion = Some(candidate.criterion).filter(|value| value.is_finite());
+            row.set_item("criterion", criterion)?;
             row.set_item("chosen", place == self.found.chosen)?;
             Ok(row)
         };
