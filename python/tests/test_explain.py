@@ -79,9 +79,11 @@ def test_a_hum_is_no_mode_that_rings_on(frequency, amplitude):
     assert values["amplitude"] == pytest.approx(amplitude, rel=0.05)
 
 
-def test_a_column_that_repeats_the_input_is_no_effect():
+@pytest.mark.parametrize("channel", ["u", "y"])
+def test_a_column_that_repeats_a_channel_is_no_effect(channel):
+    # the reference of an amplifier or of a control loop, or a second sensor
     run = plants.draw(2, ("creep",), 15.0, SECONDS, RATE).record(0)
-    reference = 3.0 * run.u + 1.0 + 1e-3 * np.sin(np.arange(len(run.u)))
+    reference = 3.0 * getattr(run, channel) + 1.0 + 1e-3 * np.sin(np.arange(len(run.u)))
     found = gpi.explain(gpi.Record(run.u, run.y, RATE, covariates=reference))
     assert found.effects == ["creep"]
 

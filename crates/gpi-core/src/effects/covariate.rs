@@ -4,11 +4,13 @@
 //! axis) is added, either directly or through a first-order lag L of unit gain and time constant T,
 //! `x_L(k) = z x_L(k-1) + (1 - z) x(k)`, `z = exp(-Ts / T)`.
 //!
-//! A column that only repeats an input is not proposed.
+//! A column that only repeats an input or an output is not proposed: it is the reference of a loop, or another sensor of the
+//! same signal, and no disturbance.
 
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
-use crate::Record;
+use crate::{Experiment, Record};
+use nalgebra::DVectorView;
 
 /// Another measured column x is added: `y += g L x`, L a first-order lag of unit gain or none.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -60,7 +62,7 @@ impl Covariate {
             });
             let (low, high) = ranges
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-            if high <= low || follows_an_input(situation.record, column) {
+            if high <= low || follows_a_channel(situation.record, column) {
                 continue;
             }
             for output in situation.outputs() {
@@ -84,14 +86,28 @@ impl Covariate {
     }
 }
 
-/// Whether a column only repeats an input: a reference from which the input was made, or a monitor of it.
-fn follows_an_input(record: &Record, column: usize) -> bool {
-    /// Largest part of the column's variance that the input leaves unexplained.
+/// Whether a column only repeats an input (a reference from which it was made, or a monitor of it) or an output (the
+/// reference that a control loop makes it follow, or a second sensor).
+fn follows_a_channel(record: &Record, column: usize) -> bool {
+    let follows = |channel: &dyn Fn(&Experiment) -> DVectorView<f64>| {
+        follows(record, column, channel)
+    };
+    let (inputs, outputs) = (record.inputs().len(), record.outputs().len());
+    (0..inputs).any(|input| follows(&|e| e.input.column(input)))
+        || (0..outputs).any(|output| follows(&|e| e.output.column(output)))
+}
+
+/// Whether a straight line turns a channel into a column.
+fn follows(
+    record: &Record,
+    column: usize,
+    channel: &dyn Fn(&Experiment) -> DVectorView<f64>,
+) -> bool {
+    /// Largest part of the column's variance that the channel leaves unexplained.
     const LEFT: f64 = 1e-3;
-    (0..record.inputs().len()).any(|input| {
         let (mut samples, mut sums) = (0.0, [0.0; 5]);
         for experiment in record.experiments() {
-            let (u, x) = (experiment.input.column(input), experiment.covariates.column(column));
+            let (u, x) = (channel(experiment), experiment.covariates.column(column));
             samples += u.len() as f64;
             let own = [u.sum(), x.sum(), u.norm_squared(), x.norm_squared(), u.dot(&x)];
             sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
@@ -99,7 +115,6 @@ fn follows_an_input(record: &Record, column: usize) -> bool {
         let [u, x, uu, xx, ux] = sums;
         let (uu, xx, ux) = (uu - u * u / samples, xx - x * x / samples, ux - u * x / samples);
         uu * xx - ux * ux < LEFT * uu * xx
-    })
 }
 
 impl Block for Covariate {

@@ -230,7 +230,9 @@ fn is_weighty(trial: &Evidence, policy: &JudgementPolicy) -> bool {
     let takes = |part: f64, [before, after]: [f64; 2]| after < (1.0 - part) * before;
     let is_substantial = takes(policy.substantial, trial.squares)
         && takes(policy.substantial_held_out, trial.held_out.map(|blocks| blocks.iter().sum()));
-    let is_near_noise = trial.squares[1] < policy.near_noise * trial.noise;
+    let [before, after] = trial.squares;
+    let is_near_noise = after < policy.near_noise * trial.noise
+        && before - after > policy.beyond_rest * (after - trial.noise);
     is_substantial || is_near_noise || trial.is_unique || trial.is_more
 }
 
@@ -324,8 +326,12 @@ mod tests {
             })
         };
         assert_eq!(small(|_| ()), Err(Refusal::Insubstantial));
-        assert_eq!(small(|trial| trial.noise = 90.0 / 2.2), Ok(()));
-        assert_eq!(small(|trial| trial.noise = 90.0 / 2.3), Err(Refusal::Insubstantial));
+        // it takes 10, and leaves 19 or 21 above the noise
+        assert_eq!(small(|trial| trial.noise = 71.0), Ok(()));
+        assert_eq!(small(|trial| trial.noise = 69.0), Err(Refusal::Insubstantial));
+        let near = |noise| judged(|trial| (trial.squares, trial.noise) = ([300.0, 226.0], noise));
+        assert_eq!(near(101.0), Ok(()));
+        assert_eq!(near(100.0), Err(Refusal::Insubstantial), "more than 1.5 times its rms");
         assert_eq!(small(|trial| trial.is_unique = true), Ok(()));
         assert_eq!(small(|trial| trial.is_more = true), Ok(()));
     }

@@ -159,6 +159,10 @@ settings! {
         certain: f64 = 50.0, FROM_ONE;
         /// Squares over those of the noise up to which a model is near the noise: 1.5 times its rms. By hand.
         near_noise: f64 = 2.25, FROM_ONE;
+        /// Squares that an effect must take near the noise, over those that it leaves above the noise. What is left may be
+        /// another effect, or a bad fit that resembles this one a little: the first of three equal effects takes half of
+        /// what it leaves.
+        beyond_rest: f64 = 0.5, POSITIVE;
         /// Part of the squares that an effect must take far from the noise, where a bad fit resembles many effects a
         /// little, and part of the held-out squares, which varies more from block to block. By hand.
         substantial: f64 = 0.3, PART;
