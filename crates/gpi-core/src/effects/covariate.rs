@@ -89,9 +89,8 @@ impl Covariate {
 /// Whether a column only repeats an input (a reference from which it was made, or a monitor of it) or an output (the
 /// reference that a control loop makes it follow, or a second sensor).
 fn follows_a_channel(record: &Record, column: usize) -> bool {
-    let follows = |channel: &dyn Fn(&Experiment) -> DVectorView<f64>| {
-        follows(record, column, channel)
-    };
+    let follows =
+        |channel: &dyn Fn(&Experiment) -> DVectorView<f64>| follows(record, column, channel);
     let (inputs, outputs) = (record.inputs().len(), record.outputs().len());
     (0..inputs).any(|input| follows(&|e| e.input.column(input)))
         || (0..outputs).any(|output| follows(&|e| e.output.column(output)))
@@ -105,16 +104,16 @@ fn follows(
 ) -> bool {
     /// Largest part of the column's variance that the channel leaves unexplained.
     const LEFT: f64 = 1e-3;
-        let (mut samples, mut sums) = (0.0, [0.0; 5]);
-        for experiment in record.experiments() {
-            let (u, x) = (channel(experiment), experiment.covariates.column(column));
-            samples += u.len() as f64;
-            let own = [u.sum(), x.sum(), u.norm_squared(), x.norm_squared(), u.dot(&x)];
-            sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
-        }
-        let [u, x, uu, xx, ux] = sums;
-        let (uu, xx, ux) = (uu - u * u / samples, xx - x * x / samples, ux - u * x / samples);
-        uu * xx - ux * ux < LEFT * uu * xx
+    let (mut samples, mut sums) = (0.0, [0.0; 5]);
+    for experiment in record.experiments() {
+        let (u, x) = (channel(experiment), experiment.covariates.column(column));
+        samples += u.len() as f64;
+        let own = [u.sum(), x.sum(), u.norm_squared(), x.norm_squared(), u.dot(&x)];
+        sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+    }
+    let [u, x, uu, xx, ux] = sums;
+    let (uu, xx, ux) = (uu - u * u / samples, xx - x * x / samples, ux - u * x / samples);
+    uu * xx - ux * ux < LEFT * uu * xx
 }
 
 impl Block for Covariate {
