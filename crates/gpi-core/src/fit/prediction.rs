@@ -58,9 +58,9 @@ impl Model {
     /// let y = Matrix::from_fn(2000, 1, |k, _| 2.0 * u[k] + 1e-3 * (7.0 * k as f64).cos());
     /// let channel = |name| vec![Channel::new(name, "")];
     /// let record = Record::new(vec![Experiment::new(u, y)], 1e3, channel("u"), channel("y"), vec![])?;
-    /// let grid = Some(Grid::Count(0));
+    /// let [plays, deadzones] = [Grid::Count(1), Grid::Count(0)].map(Some);
     /// let options = IdentifyOptions {
-    ///     delay: Some(0), half_widths: grid.clone(), thresholds: grid, ..IdentifyOptions::default()
+    ///     delay: Some(0), half_widths: plays, thresholds: deadzones, ..IdentifyOptions::default()
     /// };
     /// let found = identify(&record, &options, &mut |_, _| true)?;
     /// let model = found.model.with_prediction(&found.refinement, &record)?;
