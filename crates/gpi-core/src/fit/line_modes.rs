@@ -149,7 +149,7 @@ mod tests {
         for k in 0..rows {
             let hum = line * (TAU * 50.0 / RATE * k as f64 + 0.4).sin();
             y[k] = u[k] + x1 + hum + 0.01 * noise();
-            (x1, x2) = (x2 - a1 * x1 + if ring > 0.0 { 0.02 * u[k] } else { 0.0 }, -a2 * x1);
+            (x1, x2) = (x2 - a1 * x1 + 0.02 * u[k], -a2 * x1);
         }
         let channel = |name: &str| vec![Channel::new(name, "")];
         let run = vec![Experiment::new(u, y)];
