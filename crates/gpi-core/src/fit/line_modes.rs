@@ -45,18 +45,22 @@ pub(crate) fn line_modes(point: &Point, record: &Record) -> Result<Vec<Complex<f
     if point.loops().next().is_some() {
         return Ok(Vec::new());
     }
+    let rings = |place: usize| {
+        let mut poles = point.dynamics.sections[place].poles().into_iter();
+        let pole = poles.find(|pole| pole.im > 0.0)?;
+        (-pole.norm().ln() * settings.part * samples <= 1.0).then_some((place, pole))
+    };
+    let modes: Vec<_> = (0..point.dynamics.sections.len()).filter_map(rings).collect();
+    if modes.is_empty() {
+        return Ok(Vec::new());
+    }
+    let residuals = point.residuals(record)?;
+    let own: f64 = scored(&residuals, record).map(|run| run.norm_squared()).sum();
+    let values = (record.scored() * record.outputs().len()) as f64;
+    let most = own * (MORE * values.ln() / values).exp();
     let mut found = Vec::new();
-    for place in 0..point.dynamics.sections.len() {
-        let poles = point.dynamics.sections[place].poles();
-        let Some(pole) = poles.into_iter().find(|pole| pole.im > 0.0) else { continue };
+    for (place, pole) in modes {
         let decay = -pole.norm().ln();
-        if decay * settings.part * samples > 1.0 {
-            continue;
-        }
-        let squares = |point: &Point| -> Result<f64, Error> {
-            let residuals = point.residuals(record)?;
-            Ok(scored(&residuals, record).map(|run| run.norm_squared()).sum())
-        };
         let rest = point.without_output_of(place).residuals(record)?;
         let step = settings.step * TAU / samples;
         let reach = (settings.reach * decay).max(settings.bins * TAU / samples);
@@ -65,10 +69,7 @@ pub(crate) fn line_modes(point: &Point, record: &Record) -> Result<Vec<Complex<f
         let coarse = (-count..=count).map(|k| pole.arg() + f64::from(k) * step);
         let values = coarse.map(|angle| (angle, beside(angle)));
         let Some(nearest) = values.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
-        let line = least(&beside, nearest, step, settings.halvings);
-        let values = (record.scored() * record.outputs().len()) as f64;
-        let worth = (MORE * values.ln() / values).exp();
-        if line <= worth * squares(point)? {
+        if least(&beside, nearest, step, settings.halvings) <= most {
             found.push(pole);
         }
     }
