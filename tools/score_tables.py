@@ -129,3 +129,30 @@ def summary(results: Sequence[Result]) -> Table:
             )
         )
     return Table("Summary", ("what", "figure"), rows)
+
+
+def clean(results: Sequence[Result]) -> Table:
+    """Return the errors of stages that lack nothing on another experiment, over the noise, by their kind.
+
+    The start of the other experiment is fitted, and the offset of the training record is kept.
+    """
+    groups: dict[str, list[Result]] = {}
+    for result in results:
+        groups.setdefault(kind_of_clean(result.name), []).append(result)
+    groups["all"] = list(results)
+    rows = []
+    for kind, found in groups.items():
+        errors = np.array([result.again for result in found])
+        quantiles = (np.median(errors), np.quantile(errors, 0.9), errors.max())
+        named = sum(bool(result.found) for result in found)
+        rows.append((kind, str(len(found)), *(f"{value:.3f}" for value in quantiles), str(named)))
+    heads = ("stages", "number", "median", "90 %", "worst", "an effect is named")
+    return Table("Stages that lack nothing: error on another experiment over the noise", heads, rows)
+
+
+def kind_of_clean(name: str) -> str:
+    """Return the kind of a stage that lacks nothing."""
+    if not name.startswith("clean "):
+        return "labelled records"
+    source = "simulated" if name.startswith("clean plant") else "textbook"
+    return f"{source}, start {'in motion' if name.endswith('in motion') else 'at rest'}"

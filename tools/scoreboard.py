@@ -25,7 +25,7 @@ import textbook_tables  # noqa: E402
 from data_folder import DEV, FOREIGN  # noqa: E402
 from gpi_hammerstein.files import write_atomically  # noqa: E402
 from plants import textbook  # noqa: E402
-from scores import Result, foreign, labelled, of_textbook, simulated  # noqa: E402
+from scores import Result, clean, foreign, labelled, of_textbook, simulated  # noqa: E402
 
 # Effects of the simulated plants. G's order and delay are left out: here, the declared model contains them.
 SINGLE = [name for name in plants.CATALOGUE if name not in ("delay", "linear-dynamics")]
@@ -121,6 +121,21 @@ def textbook_work(arguments: argparse.Namespace) -> Iterator[Job]:
             yield from ((of_textbook, (name, seed)) for seed in seeds)
 
 
+def clean_work(arguments: argparse.Namespace) -> Iterator[Job]:
+    """Yield records that lack nothing and have another experiment: simulated, of a textbook, and labelled."""
+    if not arguments.clean:
+        return
+    seeds = range(arguments.seed, arguments.seed + arguments.clean)
+    yield from ((clean, (seed, arguments.seconds)) for seed in seeds)
+    yield from ((of_textbook, ("clean", seed)) for seed in seeds)
+    for function, folder, effects in ((labelled, DEV, "effects"), (foreign, FOREIGN, "must")):
+        labels = folder / "labels.json"
+        for name, label in sorted(json.loads(labels.read_text()).items()) if labels.exists() else ():
+            others = (*label[effects], *label.get("may", ()))
+            if not others and (folder / f"{name}.again.csv.gz").exists():
+                yield function, (folder, name)
+
+
 def run(pool: Executor, work: Iterable[Job], kept: Kept) -> list[Result]:
     """Run the jobs whose results are not in the file, and print one line for each record, in order."""
     jobs = [(job, None if kept.find(job) else pool.submit(job[0], *job[1])) for job in work]
@@ -175,6 +190,13 @@ def main() -> None:
         help="N seeds of every stage of other textbooks; odd seeds start in motion",
     )
     parser.add_argument(
+        "--clean",
+        type=int,
+        default=0,
+        metavar="N",
+        help="N records each of simulated and of textbook stages that lack nothing, and the labelled ones",
+    )
+    parser.add_argument(
         "--processes",
         type=int,
         default=os.cpu_count(),
@@ -209,6 +231,7 @@ def main() -> None:
         mixed = run(pool, mixed_work(arguments), kept)
         near_noise = run(pool, power_work(arguments) if arguments.power else [], kept)
         other = run(pool, textbook_work(arguments), kept)
+        lacking_nothing = run(pool, clean_work(arguments), kept)
     tables = []
     if mixed:
         tables += [score_tables.singles(mixed), score_tables.by_number(mixed), score_tables.summary(mixed)]
@@ -217,9 +240,11 @@ def main() -> None:
     if other:
         tables += [textbook_tables.by_stage(other), textbook_tables.totals(other)]
         tables.append(textbook_tables.mistakes(other, reproduced))
+    if lacking_nothing:
+        tables.append(score_tables.clean(lacking_nothing))
     for table in tables:
         print(table.text())
-    seconds = [result.seconds for result in (*mixed, *near_noise, *other)]
+    seconds = [result.seconds for result in (*mixed, *near_noise, *other, *lacking_nothing)]
     if seconds:
         print(f"\ntime: median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s")
     if arguments.markdown is not None:

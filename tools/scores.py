@@ -134,6 +134,18 @@ def simulated(seed: int, effects: tuple[str, ...], strength: float | None, secon
     return explained(name, wanted, record, again, plant.noise_std, is_outside=is_outside, strength=strength)
 
 
+def clean(seed: int, seconds: float) -> Result:
+    """Explain one record of a simulated stage that lacks nothing; odd seeds start in motion.
+
+    A record that starts in motion has an unknown past, and two or three kinds of excitation.
+    """
+    in_motion = textbook.is_in_motion(seed)
+    plant = plants.draw(seed, (), seconds=seconds, in_motion=in_motion)
+    record, again = (as_record(plant.record(number)) for number in (0, 1))
+    name = f"clean plant {seed}{', in motion' if in_motion else ''}"
+    return explained(name, (), record, again, plant.noise_std)
+
+
 def of_textbook(stage: str, seed: int) -> Result:
     """Explain one record of a stage of another textbook; the label says what must and what may be named."""
     label = textbook.STAGES[stage]

@@ -216,16 +216,18 @@ def draw(
     strength: float | Mapping[str, float] | None = 10.0,
     seconds: float = 30.0,
     rate: float | None = None,
+    in_motion: bool | None = None,
 ) -> Plant:
     """Draw a stage.
 
     `effects` are names of `CATALOGUE` or `OUTSIDE`, or `"unattributed"` for one of the latter. `strength`
     is the rms of each effect over the noise in experiment 0, or one by name; None, or no name, draws what
     is usual for the effect. A delay is whole samples and has the size that it has. `seconds` and `rate`,
-    in Hz, are those of the records.
+    in Hz, are those of the records. `in_motion`: records begin in motion; None lets one seed in four do so.
     """
     random = stream("plant", seed)
-    in_motion, has_column = bool(random.random() < 0.25), bool(random.random() < 0.3)
+    moves, has_column = bool(random.random() < 0.25), bool(random.random() < 0.3)
+    in_motion = moves if in_motion is None else in_motion
     unnamed = str(random.choice(list(OUTSIDE)))
     names = {unnamed if name == "unattributed" else name for name in effects}
     if names - EFFECTS.keys():
