@@ -186,6 +186,18 @@ pub enum Error {
         tolerance: f64,
     },
 
+    /// A simulated output is not finite.
+    #[error(
+        "the simulated output is not finite from sample {sample} on; the largest pole of the linear model has \
+         modulus {modulus}: check the model's numbers and the input's unit"
+    )]
+    Diverged {
+        /// The first sample that is not finite, from 0.
+        sample: usize,
+        /// The spectral radius of G; the model is unstable if it is above 1.
+        modulus: f64,
+    },
+
     /// The caller's progress function requested a stop.
     #[error("stopped on request")]
     Interrupted,
@@ -223,9 +235,10 @@ impl Error {
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::Parameter { .. } | Self::Operator(_) => ErrorKind::Parameter,
-            Self::Unstable { .. } | Self::ZeroOnUnitCircle { .. } | Self::NotConverged { .. } => {
-                ErrorKind::Numerical
-            }
+            Self::Unstable { .. }
+            | Self::ZeroOnUnitCircle { .. }
+            | Self::NotConverged { .. }
+            | Self::Diverged { .. } => ErrorKind::Numerical,
             _ => ErrorKind::Data,
         }
     }

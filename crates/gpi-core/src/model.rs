@@ -40,6 +40,7 @@ pub struct ModelState {
     /// One state per input.
     pub hysteresis: Vec<GpiState<f64, Vec<f64>>>,
     /// The state x of the linear dynamics.
+    #[serde(with = "crate::linear::matrix_file::vector")]
     pub linear: DVector<f64>,
     /// What each effect remembers.
     #[serde(default)]
@@ -225,6 +226,7 @@ impl Model {
         Error::require_equal("channels", ("input", input.ncols()), ("hysteresis", inputs))?;
         let rows = ("covariates", covariates.nrows());
         Error::require_equal("samples", ("input", samples), rows)?;
+        self.require_own(state)?;
         let drive = self.drive_from(state, input);
         let v = self.intermediate_from(state, &drive)?;
         let mut output = self.respond_from(state, &v)?;
@@ -235,6 +237,7 @@ impl Model {
         for (mut column, offset) in output.column_iter_mut().zip(&self.offsets) {
             column.add_scalar_mut(*offset);
         }
+        self.require_bounded(&output)?;
         Ok(output)
     }
 
@@ -263,6 +266,17 @@ impl Model {
         let mut state = self.start_of(input)?;
         let drive = self.drive_from(&mut state, input);
         self.intermediate_from(&mut state, &drive)
+    }
+
+    /// Refuses an output that is not finite, which only an unstable model or absurd numbers give.
+    fn require_bounded(&self, output: &Matrix) -> Result<(), Error> {
+        // counted first: a count vectorizes, a search does not
+        if output.as_slice().iter().filter(|value| !value.is_finite()).count() == 0 {
+            return Ok(());
+        }
+        let is_wrong = |row: &usize| output.row(*row).iter().any(|value| !value.is_finite());
+        let sample = (0..output.nrows()).find(is_wrong).unwrap_or(0);
+        Err(Error::Diverged { sample, modulus: self.linear.spectral_radius()? })
     }
 
     fn start_of(&self, input: &Matrix) -> Result<ModelState, Error> {
@@ -317,6 +331,8 @@ impl Model {
     /// A schema that this version does not know, text that is not a model.
     pub fn from_json(text: &str) -> Result<Self, Error> {
         let reason = |error: serde_json::Error| Error::ModelFile { reason: error.to_string() };
+        // some editors begin a text file with a byte order mark
+        let text = text.trim_start_matches('\u{feff}');
         let value: serde_json::Value = serde_json::from_str(text).map_err(reason)?;
         match value.get("schema").and_then(serde_json::Value::as_str) {
             Some(Self::SCHEMA) => {}
@@ -342,7 +358,7 @@ impl Model {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::linear::TransferFunction;
     use crate::operators::{Deadzones, PlayBank, Reading};

@@ -48,8 +48,6 @@
 //! - Derivatives by the values of effects that neither read the plays through curves, nor are sections, nor are loops
 //!   are differences ([`effect_columns`]).
 //! - [`Stream::with_memory`](stream::Stream::with_memory) leaves out what has decayed.
-//! - The derivative by a half-width leaves out that a curve through which the play is read may depend on the half-width
-//!   itself ([`sensitivity`]).
 //! - The steady state before the record contains no loop. Its derivatives by what a loop drives do: they contain
 //!   `(I - A)^-1 w(0)`, which is an error where w(0) is not zero, and decays with the dynamics ([`tangents`]).
 //! - What a backlash holds before it first slides is taken as independent of the unknowns ([`sensing`]).
@@ -64,6 +62,7 @@ mod lanes;
 #[cfg(test)]
 pub(crate) mod looped;
 mod loops;
+mod memories;
 mod model;
 mod motion;
 mod names;

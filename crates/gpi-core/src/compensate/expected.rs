@@ -135,7 +135,15 @@ impl Run<'_> {
                 let state = self.start.state(&model)?;
                 self.output(&model, state)
             };
-            let slope = (moved(step)? - moved(-step)?) / (2.0 * step);
+            // a neighbour may be no valid model: a gap below zero, an unstable pole
+            let here = || self.scored(self.predicted.clone());
+            let pair = (moved(step), moved(-step));
+            let slope = match pair {
+                (Ok(up), Ok(down)) => (up - down) / (2.0 * step),
+                (Ok(up), Err(_)) => (up - here()) / step,
+                (Err(_), Ok(down)) => (here() - down) / step,
+                (Err(error), Err(_)) => return Err(error),
+            };
             Ok::<_, Error>(slope.map(|change| change * change))
         };
         let (rows, outputs) = (self.predicted.nrows() - self.lead, self.predicted.ncols());

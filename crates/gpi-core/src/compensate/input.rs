@@ -44,7 +44,8 @@ pub(super) fn slow_down(
         let most = own.map(InputStage::fastest).fold(slew, f64::min) / model.rate();
         let mut before = at_rest.map_or(column[0], |values| values[input]);
         for k in 0..column.len() {
-            let value = column[k].clamp(before - most, before + most);
+            // not `clamp`, which panics at a drive that has overflowed; the simulation refuses such a drive
+            let value = column[k].max(before - most).min(before + most);
             too_fast += usize::from(value != column[k]);
             (column[k], before) = (value, value);
         }

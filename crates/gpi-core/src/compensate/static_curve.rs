@@ -62,12 +62,16 @@ fn of_degree(
             gram.ger(1.0, &row, &row, 1.0);
             right.axpy(u, &row, 1.0);
         }
+        let no_curve = || {
+            Error::parameter("reference", v.max(), "no static curve fits the drive: it overflows")
+        };
+        // the decomposition of a matrix that has overflowed panics
+        if gram.iter().chain(right.iter()).any(|value| !value.is_finite()) {
+            return Err(no_curve());
+        }
         let found = gram.svd(true, true);
         let least = DETERMINED * found.singular_values.max();
-        let requirement = "no static curve fits the drive";
-        let coefficients = found
-            .solve(&right, least)
-            .map_err(|_| Error::parameter("reference", f64::NAN, requirement))?;
+        let coefficients = found.solve(&right, least).map_err(|_| no_curve())?;
         v.apply(|value| *value = basis(*value).dot(&coefficients));
     }
     Ok(curve)

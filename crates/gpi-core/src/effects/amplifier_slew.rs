@@ -3,6 +3,7 @@
 //! `u_s(k) = u_s(k-1) + clamp(u(k) - u_s(k-1), -s Ts, s Ts)`, (E2) in the documentation's theory, with the
 //! limit s and the sampling interval Ts: the drive follows the input, but never faster than s.
 
+use super::flaws::positive;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, InputStage, Proposal, Quantity, Situation, Stage, Units};
 
@@ -68,6 +69,10 @@ impl Block for AmplifierSlew {
         let unit =
             if units.input.is_empty() { String::new() } else { format!("{}/s", units.input) };
         vec![Quantity::new("slew_limit", unit, self.limit)]
+    }
+
+    fn flaw(&self) -> Option<String> {
+        positive(&[("limit", self.limit)])
     }
 }
 

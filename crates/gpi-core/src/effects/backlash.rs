@@ -3,6 +3,7 @@
 //! `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`, (E10) in the documentation's theory: the output follows the
 //! displacement x only while the gap of width 2 b is closed. It is the play operator of half-width b.
 
+use super::flaws::positive;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units};
 use crate::operators::play;
@@ -61,6 +62,10 @@ impl Block for Backlash {
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
         vec![Quantity::strength("gap", units.output, 2.0 * self.half_width)]
+    }
+
+    fn flaw(&self) -> Option<String> {
+        positive(&[("half_width", self.half_width)])
     }
 }
 

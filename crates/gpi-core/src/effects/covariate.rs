@@ -146,6 +146,11 @@ impl Block for Covariate {
         }
         quantities
     }
+
+    fn flaw(&self) -> Option<String> {
+        let lag = self.time_constant;
+        (lag < 0.0).then(|| format!("its time constant of {lag} s must not be negative"))
+    }
 }
 
 impl Added for Covariate {

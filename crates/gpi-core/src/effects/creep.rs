@@ -8,6 +8,7 @@
 //! L_i = (1 - z_i) q^-1 / (1 - z_i q^-1),      z_i = exp(-Ts / T_i).
 //! ```
 
+use super::flaws::{late, positive};
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Coefficients, ParallelSections, Proposal, Quantity, Situation, Stage, Units};
 
@@ -108,6 +109,15 @@ impl Block for Creep {
             quantities.push(Quantity::strength(format!("gain[{i}]"), "", gain));
         }
         quantities
+    }
+
+    fn flaw(&self) -> Option<String> {
+        let (times, gains) = (self.time_constants.len(), self.gains.len());
+        if times != gains {
+            return Some(format!("has {times} time constants, but {gains} gains"));
+        }
+        let times = self.time_constants.iter().map(|&time| ("time_constants", time));
+        late(self.dead_time).or_else(|| positive(&times.collect::<Vec<_>>()))
     }
 }
 

@@ -57,6 +57,12 @@ impl Block for Delay {
     fn quantities(&self, _: Units) -> Vec<Quantity> {
         vec![Quantity::strength("delay", "samples", self.samples)]
     }
+
+    fn flaw(&self) -> Option<String> {
+        let is_held = (0.0..=LONGEST).contains(&self.samples);
+        (!is_held)
+            .then(|| format!("a delay of {} samples; it must be 0 to {LONGEST}", self.samples))
+    }
 }
 
 impl InputStage for Delay {

@@ -3,6 +3,7 @@
 //! `y += d(t)`, (E11) in the documentation's theory; d is a smooth curve through evenly spaced knots (see
 //! `knots`). Its first value is 0, because the model has an offset.
 
+use super::flaws::positive;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units, knots};
 
@@ -60,6 +61,10 @@ impl Block for Drift {
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
         knots::quantities("drift", units.output, &self.changes, self.duration)
+    }
+
+    fn flaw(&self) -> Option<String> {
+        positive(&[("duration", self.duration), ("span", self.span)])
     }
 }
 

@@ -3,6 +3,7 @@
 //! `y = x (1 + g(t))`, (E9) in the documentation's theory; g is a smooth curve through evenly spaced knots
 //! (see `knots`). Its first value is 0, because the play weights hold the gain at the start.
 
+use super::flaws::positive;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{
     Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units, knots,
@@ -55,6 +56,10 @@ impl Block for GainDrift {
 
     fn quantities(&self, _: Units) -> Vec<Quantity> {
         knots::quantities("gain_change", "", &self.changes, self.duration)
+    }
+
+    fn flaw(&self) -> Option<String> {
+        positive(&[("duration", self.duration)])
     }
 }
 

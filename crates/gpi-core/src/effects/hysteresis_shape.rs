@@ -15,6 +15,7 @@
 //! thresholds. Their minor loops change with the place; with q = 0 the hysteresis is the declared one. The
 //! integral of `P_a` from -1 is `(P_{a+1} - P_{a-1}) / (2 a + 1)`.
 
+use super::flaws::positive;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, PlayCurves, PlayRead, Proposal, Quantity, Situation, Stage, Units};
 
@@ -139,9 +140,11 @@ impl Block for HysteresisShape {
     fn flaw(&self) -> Option<String> {
         let (count, widths) = (self.coefficients.len(), self.widths);
         let fits = (1..=MOST).contains(&widths) && count % widths == 0 && count / widths <= MOST;
-        (!fits).then(|| {
-            format!("{count} coefficients in rows of {widths}; at most {MOST} rows of {MOST}")
-        })
+        if !fits {
+            let most = format!("at most {MOST} rows of {MOST}");
+            return Some(format!("{count} coefficients in rows of {widths}; {most}"));
+        }
+        positive(&[("scale", self.scale), ("widest", self.widest)])
     }
 }
 

@@ -7,6 +7,7 @@
 //! the natural frequency `|s| / 2 pi` and the damping `-Re s / |s|`, real poles give time constants `-1/s`;
 //! the static gain is `(b1 + b2) / (1 + a1 + a2)`.
 
+use super::flaws::{late, positive};
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Coefficients, ParallelSections, Proposal, Quantity, Situation, Stage, Units};
 
@@ -95,6 +96,14 @@ impl Block for LinearDynamics {
             Quantity::new("damping", "", decay / natural),
             gain,
         ]
+    }
+
+    fn flaw(&self) -> Option<String> {
+        let (poles, gains) = (self.denominator.len(), self.numerator.len());
+        if (poles, gains) != (2, 2) {
+            return Some(format!("has {poles} and {gains} coefficients; both must be 2"));
+        }
+        late(self.dead_time).or_else(|| positive(&[("rate", self.rate)]))
     }
 }
 

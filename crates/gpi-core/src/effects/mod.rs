@@ -6,6 +6,7 @@
 //! type and the place in one line of the catalogue below.
 
 mod block;
+mod flaws;
 mod inner_loop;
 mod knots;
 mod loop_signals;

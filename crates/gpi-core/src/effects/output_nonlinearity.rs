@@ -4,6 +4,7 @@
 //! m_0 and half the span s of the displacement x. There is no term of degree 1, because the play weights hold
 //! that gain.
 
+use super::flaws::positive;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units};
 
@@ -62,6 +63,10 @@ impl Block for OutputNonlinearity {
             Quantity::strength(format!("curve[{}]", i + 2), units.output, c * self.scale)
         };
         self.coefficients.iter().enumerate().map(term).collect()
+    }
+
+    fn flaw(&self) -> Option<String> {
+        positive(&[("scale", self.scale)])
     }
 }
 

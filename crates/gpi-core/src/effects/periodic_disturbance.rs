@@ -3,6 +3,7 @@
 //! `y += a cos(2 pi f t) + b sin(2 pi f t)`, (E12) in the documentation's theory. The sinusoid
 //! `A cos(2 pi f t + phi)` has `a = A cos phi` and `b = -A sin phi`.
 
+use super::flaws::positive;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
 use crate::spectrum::{Strongest, near, peak, power};
@@ -140,6 +141,10 @@ impl Block for PeriodicDisturbance {
             Quantity::strength("amplitude", units.output, self.cosine.hypot(self.sine)),
             Quantity::new("phase", "rad", (-self.sine).atan2(self.cosine)),
         ]
+    }
+
+    fn flaw(&self) -> Option<String> {
+        positive(&[("frequency", self.frequency), ("duration", self.duration), ("span", self.span)])
     }
 }
 

@@ -8,6 +8,7 @@
 //! `g(s) = s_0 ((1 + s/s_0)^e - 1) / e`. Its slope at s = 0 is 1; beyond the knee s_0 it grows more slowly.
 //! The law sees s through a first-order lag.
 
+use super::flaws::positive;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, PlayWidths, Proposal, Quantity, Situation, Stage, Units};
 
@@ -137,6 +138,12 @@ impl Block for RateDependence {
             quantities.push(Quantity::new("lag", "s", law.lag));
         }
         quantities
+    }
+
+    fn flaw(&self) -> Option<String> {
+        let (knee, lag) = self.law.map_or((1.0, 0.0), |law| (law.knee, law.lag));
+        let speeds = positive(&[("speed", self.speed), ("knee", knee)]);
+        speeds.or_else(|| (lag < 0.0).then(|| format!("its lag of {lag} s must not be negative")))
     }
 }
 

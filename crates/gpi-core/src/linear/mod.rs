@@ -6,6 +6,7 @@ mod era;
 mod fir;
 mod laurent;
 mod least_squares;
+pub(crate) mod matrix_file;
 mod section;
 mod sections;
 mod state_space;

@@ -14,9 +14,13 @@ const BLOCK: usize = 1024;
 /// paper, with the Markov parameters of [`StateSpace::markov`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StateSpace {
+    #[serde(with = "super::matrix_file")]
     pub(super) a: Matrix,
+    #[serde(with = "super::matrix_file")]
     pub(super) b: Matrix,
+    #[serde(with = "super::matrix_file")]
     pub(super) c: Matrix,
+    #[serde(with = "super::matrix_file")]
     pub(super) d: Matrix,
 }
 
