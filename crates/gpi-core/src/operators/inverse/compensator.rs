@@ -22,8 +22,8 @@ use crate::operators::{Lags, LagsState, Operator, OperatorError, Sample, Storage
 /// bad sample changes each lag by at most `rate_i b`. After m bad and n good samples, v therefore differs from the v
 /// without the bad samples by at most `m b sum_i rate_i |c_i / gain| (1 - min_i rate_i)^n`. (With the weights
 /// `c_i / (gain rate_i)`, the matrix that maps the errors of the lags to those of the next sample is symmetric, and no
-/// eigenvalue exceeds `1 - min_i rate_i`.) The inverse plays return to the state without the bad samples when the
-/// reference has moved over the range of its earlier extremes. Until then, the drive is the right one for the actuator,
+/// eigenvalue exceeds `1 - min_i rate_i`.) The inverse plays return to the state without the bad samples when v
+/// has moved up and down by twice their largest half-width. Until then, the drive is the right one for the actuator,
 /// whose plays have followed the bad samples too.
 ///
 /// `E`, `S` and `L` store the parameters of deadzones, plays and lags: `[T; N]` on firmware.
