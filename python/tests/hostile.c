@@ -49,7 +49,7 @@ static int is_wrong(const STATE *state)
     if (!(state->drive >= LOW && state->drive <= HIGH))
         return fail("the drive is not within its limits", state->drive, 0);
     for (i = 0; i < PLAYS; ++i)
-        if (!(state->plays[i] >= V_LOW - half_widths[i] && state->plays[i] <= V_HIGH + half_widths[i]))
+        if (!(state->plays[i] >= V_LOW * 1.0001 - half_widths[i] && state->plays[i] <= V_HIGH * 1.0001 + half_widths[i]))
             return fail("a play is out of range", state->plays[i], 0);
 #ifdef LAGS
     for (i = 0; i < LAGS; ++i)

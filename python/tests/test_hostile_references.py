@@ -38,7 +38,7 @@ def numbers(compensator, precision):
     lows, highs = inverse.limits
     huge, epsilon = float(NUMBERS[precision].max), float(NUMBERS[precision].eps)
     slope = float(np.max(np.abs(inverse.curve[2])) * np.sum(np.abs(inverse.plays.weights)))
-    return {
+    own = {
         "LOW": max(lows, -huge),
         "HIGH": min(highs, huge),
         "V_LOW": low,
@@ -51,6 +51,7 @@ def numbers(compensator, precision):
         # a lag keeps the rounding errors of the bad sample, which are relative to the range
         "ROUNDING": 40 * epsilon * slope * (half + widest + (high - low) * float(np.sum(rates))),
     }
+    return {name: float(value) for name, value in own.items()}
 
 
 def built(tmp_path, effect, precision, limits):

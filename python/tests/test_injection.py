@@ -109,7 +109,7 @@ def test_texts_deep_in_a_model_file_are_checked(place):
 
 
 def in_c(folder, model):
-    """The exported C without comments, as the preprocessor sees it; it is compiled and its symbols are checked."""
+    """The exported C without comments, as the preprocessor sees it; its symbols are checked."""
     gpi.export_c(model, folder, name="own")
     flags = ["-std=c99", "-trigraphs", "-Wall", "-Wextra", "-Werror"]
     subprocess.run(["cc", *flags, "-c", "-o", folder / "own.o", folder / "own.c"], check=True)
@@ -192,7 +192,7 @@ def test_pictures_show_names_as_they_are(text):
 
 @pytest.mark.filterwarnings("ignore:Glyph")
 def test_a_report_contains_only_its_own_elements(tmp_path):
-    """Its elements are those of the same report with plain names, and its policy permits its own script only."""
+    """Its elements are those of a report with plain names, and its policy permits its own script only."""
     rng = np.random.default_rng(3)
     u = gpi.multisine(1200, 1000.0, (0.5, 300.0), (0.0, 10.0), seed=3)
     y = gpi.PlayBank([0.0, 1.0], [1.0, 0.5])(u) + 0.01 * rng.standard_normal(len(u))

@@ -22,9 +22,6 @@ __all__ = ["export_c", "export_rust"]
 
 Precision = Literal["single", "double"]
 
-# Smallest normal number of single precision: the reciprocal of a smaller gain overflows.
-TINY = float(np.finfo(np.float32).tiny)
-
 
 def export_c(
     model: Model,
@@ -168,12 +165,15 @@ def written_numbers(
     standing_gain = float(sum(compensator.creep_gains, start=compensator.gain))
     lowest_v, highest_v = compensator.range
     safe_below, safe_above = inverse.safe
-    finite = {
+    finite: dict[str, ArrayLike] = {
         **arrays,
         "gain": compensator.gain,
         "standing_gain": standing_gain,
         "offset": compensator.offset,
         "range": compensator.range,
+        # the largest sum and the largest drive within this range
+        "sum": np.sum(np.abs(plays.weights)) * np.array(compensator.range),
+        "drive": np.max(np.abs(slopes)) * np.sum(np.abs(plays.weights)) * np.array(compensator.range),
     }
     for what, values in finite.items():
         require_written(what, values, number)
@@ -214,12 +214,16 @@ def written_numbers(
 
 
 def require_written(name: str, values: ArrayLike, number: type[np.floating[Any]]) -> None:
-    """Reject a parameter that becomes infinite, or a divisor that becomes zero, in this precision."""
+    """Reject a parameter that becomes infinite in this precision, and a gain whose reciprocal does."""
     with np.errstate(over="ignore", under="ignore"):
         rounded = np.asarray(values, dtype=np.float64).astype(number)
-    if not np.isfinite(rounded).all() or (name.endswith("gain") and not np.all(np.abs(rounded) > TINY)):
+    if not np.isfinite(rounded).all() or (
+        name.endswith("gain") and not np.all(np.abs(rounded) > np.finfo(number).tiny)
+    ):
+        precision = "single" if number is np.float32 else "double"
         raise ParameterError(
-            f"`precision` = single: `{name}` of the compensator is not a normal number in it; use double"
+            f"`precision` = {precision}: `{name}` of the compensator is not a normal number in it; use double "
+            "precision or other units"
         )
 
 

@@ -3,6 +3,8 @@
 $facts
 
 #![forbid(unsafe_code)]
+// a program need not use every function
+#![allow(dead_code)]
 
 /// The number type.
 pub type Real = $real;
