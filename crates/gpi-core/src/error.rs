@@ -135,7 +135,7 @@ pub enum Error {
     )]
     Name {
         /// What the text is, with its article.
-        what: &'static str,
+        what: String,
         /// Its beginning, with the refused characters escaped.
         text: String,
         /// The problem, with the character.

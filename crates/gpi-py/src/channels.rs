@@ -16,7 +16,7 @@ impl<'py> FromPyObject<'_, 'py> for Label {
         text.to_str().map(|text| Self(text.to_owned())).map_err(|_| {
             let reason = "contains half a surrogate pair".to_owned();
             let text = text.to_string_lossy().into_owned();
-            to_python(Error::Name { what: "the name or unit", text, reason })
+            to_python(Error::Name { what: "the name or unit".to_owned(), text, reason })
         })
     }
 }

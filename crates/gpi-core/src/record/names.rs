@@ -14,7 +14,7 @@ const LONGEST: usize = 1000;
 const SHOWN: usize = 40;
 
 /// Rejects a text that no honest file contains; `what` says what it is, such as "a name".
-pub(crate) fn require_text(what: &'static str, text: &str) -> Result<(), Error> {
+pub(crate) fn require_text(what: &str, text: &str) -> Result<(), Error> {
     let is_foreign = |c: char| {
         let changes_direction = matches!(c, '\u{61c}' | '\u{200e}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
         c.is_control() || changes_direction || matches!(c, '\u{2028}' | '\u{2029}')
@@ -31,6 +31,7 @@ pub(crate) fn require_text(what: &'static str, text: &str) -> Result<(), Error> 
             if is_foreign(c) { Box::new(c.escape_unicode()) } else { Box::new(std::iter::once(c)) };
         escaped
     });
+    let what = what.to_owned();
     Err(Error::Name { what, text: shown.collect(), reason })
 }
 
@@ -38,16 +39,28 @@ pub(crate) fn require_text(what: &'static str, text: &str) -> Result<(), Error> 
 pub(crate) fn require_names(channels: &[Channel]) -> Result<(), Error> {
     channels.iter().try_for_each(|channel| {
         require_text("the name", &channel.name)?;
-        require_text("the unit", &channel.unit)
+        require_text(&format!("the unit of `{}`", channel.name), &channel.unit)
     })
 }
 
 /// Rejects a model file with such a text anywhere: besides names and units, a file has labels of effects and of estimates.
+/// The error says where the text is, such as `inputs[0].unit`.
 pub(crate) fn require_texts(value: &serde_json::Value) -> Result<(), Error> {
+    require_texts_at("", value)
+}
+
+fn require_texts_at(place: &str, value: &serde_json::Value) -> Result<(), Error> {
     match value {
-        serde_json::Value::String(text) => require_text("the text", text),
-        serde_json::Value::Array(values) => values.iter().try_for_each(require_texts),
-        serde_json::Value::Object(values) => values.values().try_for_each(require_texts),
+        serde_json::Value::String(text) => require_text(&format!("the text at `{place}`"), text),
+        serde_json::Value::Array(values) => values
+            .iter()
+            .enumerate()
+            .try_for_each(|(index, value)| require_texts_at(&format!("{place}[{index}]"), value)),
+        serde_json::Value::Object(values) => values.iter().try_for_each(|(key, value)| {
+            require_text("a key of the model file", key)?;
+            let dot = if place.is_empty() { "" } else { "." };
+            require_texts_at(&format!("{place}{dot}{key}"), value)
+        }),
         _ => Ok(()),
     }
 }
@@ -95,9 +108,16 @@ mod tests {
         for place in 0..3 {
             let mut names = ["V", "um", "K"];
             names[place] = "a\nb";
-            assert!(matches!(record(names), Err(Error::Name { what: "the unit", .. })));
+            assert!(
+                matches!(record(names), Err(Error::Name { what, .. }) if what.starts_with("the unit"))
+            );
         }
         let nested = serde_json::json!({"effects": [{"label": "\u{1b}[2J"}]});
-        assert!(matches!(require_texts(&nested), Err(Error::Name { .. })));
+        let what = "the text at `effects[0].label`";
+        assert!(
+            matches!(require_texts(&nested), Err(Error::Name { what: found, .. }) if found == what)
+        );
+        let key = serde_json::json!({"\u{1b}": 1});
+        assert!(matches!(require_texts(&key), Err(Error::Name { .. })));
     }
 }
