@@ -225,9 +225,6 @@ ${name}_real ${name}_step(${name}_state *state, ${name}_real reference)
 @end
     if (!is_finite(reference)) {
         state->faults |= ${NAME}_NOT_FINITE;
-@creep
-        creep_on(state, state->plays[0]);
-@end
         return state->drive;
     }
 @creep

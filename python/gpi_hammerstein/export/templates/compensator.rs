@@ -64,7 +64,7 @@ pub struct Faults {
 /// What happens at bad samples:
 ///
 /// - The drive and the state are finite after every sequence of references, and the drive is within its limits.
-/// - A reference that is NaN or infinite holds the drive. [`Compensator::standing_at`] takes it as $rest,
+/// - A reference that is NaN or infinite changes neither the drive nor the state. [`Compensator::standing_at`] takes it as $rest,
 ///   where v = 0.
 /// - v is limited to $v_range. In the steady state, these are the references
 ///   $lowest_reference .. $highest_reference. A drive at its limit within this range is no fault.
@@ -72,7 +72,7 @@ pub struct Faults {
 /// - After m bad and n good samples, v differs from the v without the bad samples by at most m * $recovery * $decay^n,
 ///   apart from rounding errors, if all gains of creep have the sign of the gain.
 ///   The plays return to the same state when v has moved up and down by twice the largest half-width, $widest. Until
-///   then, the drive is the right one for the actuator, which has followed the bad samples too.
+///   then, the drive is the right one for the actuator, which has followed the drive too.
 #[derive(Clone, Debug)]
 pub struct Compensator {
     plays: [Real; PLAYS],
@@ -110,9 +110,6 @@ impl Compensator {
     pub fn step(&mut self, reference: Real) -> Real {
         if !reference.is_finite() {
             self.faults.not_finite = true;
-@creep
-            self.creep_on(self.plays[0]);
-@end
             return self.drive;
         }
 @creep

@@ -151,12 +151,6 @@ where
         self.curve.at(z).at_most(self.drive[1]).at_least(self.drive[0])
     }
 
-    /// The v that the plays have reached; zero for a bank without plays.
-    pub(super) fn reached(&self, state: &InverseState<S>) -> E::Item {
-        // the first play has no width, so its output is v
-        state.plays.plays.values().first().copied().unwrap_or(E::Item::ZERO)
-    }
-
     /// The drive u for v, and the v that this drive reaches.
     #[inline]
     pub fn step_reached(&self, state: &mut InverseState<S>, v: E::Item) -> (E::Item, E::Item) {
