@@ -49,6 +49,12 @@ static const real slopes[KNOTS + 1] = {
     0.98039216f, 0.96153843f, 0.95238096f, 0.98039216f, 0.96153843f, 0.95238096f,
 };
 
+/* The range of v, and the part of it in which neither this range nor a limit of the drive is reached. */
+static const real lowest_v = -170.3382f;
+static const real highest_v = 171.423f;
+static const real usual_below = -52.8758f;
+static const real usual_above = 53.9606f;
+
 /* The limits of the drive, the corresponding inputs of the inverse deadzones, and the range of v in which no limit is reached. */
 static const real lowest_drive = -120.0f;
 static const real highest_drive = 120.0f;
@@ -148,9 +154,13 @@ static real input_for(const real *places, real output)
     return slope > 0 ? v + (output - reached) / slope : v;
 }
 
-/* Moves the plays to v, or to the nearest v that can be reached, and sets the drive. */
-static real move(gpi_compensator_state *state, real v)
+/* Moves the plays to the nearest v that can be reached. */
+static real move_far(gpi_compensator_state *state, real v)
 {
+    if (v < lowest_v || v > highest_v) {
+        v = clamp(v, lowest_v, highest_v);
+        state->faults |= GPI_COMPENSATOR_SATURATED;
+    }
     if (v < safe_below || v > safe_above) {
         real z = 0, within;
         int i;
@@ -169,12 +179,42 @@ static real move(gpi_compensator_state *state, real v)
     return v;
 }
 
+/* Moves the plays to v, or to the nearest v that can be reached, and sets the drive. */
+static real move(gpi_compensator_state *state, real v)
+{
+    if (v < usual_below || v > usual_above)
+        return move_far(state, v);
+    state->drive = drive_for(step_plays(state->plays, v));
+    return v;
+}
+
+static int is_finite(real reference)
+{
+    return reference >= -FLT_MAX && reference <= FLT_MAX;
+}
+
+static void creep_on(gpi_compensator_state *state, real v)
+{
+    int i;
+    for (i = 0; i < LAGS; ++i) {
+        const real wanted = lag_rates[i] * (v - state->lags[i]) + state->carried[i];
+        const real there = state->lags[i] + wanted;
+        state->carried[i] = wanted - (there - state->lags[i]);
+        state->lags[i] = there;
+    }
+}
+
 void gpi_compensator_start(gpi_compensator_state *state, gpi_compensator_real reference)
 {
     int i;
     real v;
     for (i = 0; i < PLAYS; ++i)
         state->plays[i] = 0;
+    state->faults = 0;
+    if (!is_finite(reference)) {
+        reference = offset;
+        state->faults |= GPI_COMPENSATOR_NOT_FINITE;
+    }
     v = move(state, (reference - offset) / standing_gain);
     for (i = 0; i < LAGS; ++i) {
         state->lags[i] = v;
@@ -187,16 +227,14 @@ gpi_compensator_real gpi_compensator_step(gpi_compensator_state *state, gpi_comp
 {
     real creep = 0, v;
     int i;
-    if (!(reference >= -FLT_MAX && reference <= FLT_MAX))
+    if (!is_finite(reference)) {
+        state->faults |= GPI_COMPENSATOR_NOT_FINITE;
+        creep_on(state, state->plays[0]);
         return state->drive;
+    }
     for (i = 0; i < LAGS; ++i)
         creep += lag_gains[i] * state->lags[i];
     v = move(state, (reference - offset - creep) / gain);
-    for (i = 0; i < LAGS; ++i) {
-        const real wanted = lag_rates[i] * (v - state->lags[i]) + state->carried[i];
-        const real there = state->lags[i] + wanted;
-        state->carried[i] = wanted - (there - state->lags[i]);
-        state->lags[i] = there;
-    }
+    creep_on(state, v);
     return state->drive;
 }

@@ -129,6 +129,19 @@ pub enum Error {
         count: usize,
     },
 
+    /// A text from a file that no honest name is like.
+    #[error(
+        "{what} `{text}` {reason}, which no printed name has; rename the column or correct the file"
+    )]
+    Name {
+        /// What the text is, with its article.
+        what: String,
+        /// Its beginning, with the refused characters escaped.
+        text: String,
+        /// The problem, with the character.
+        reason: String,
+    },
+
     /// Samples are missing.
     #[error(
         "the time stamps have {count} gaps, the first of {gap} s after row {row} (t = {time} s, \

@@ -91,6 +91,8 @@ impl Model {
         Error::require_equal("inputs", ("names", inputs), ("linear", self.linear.inputs()))?;
         Error::require_equal("outputs", ("names", outputs), ("linear", self.linear.outputs()))?;
         Error::require_equal("outputs", ("names", outputs), ("offsets", self.offsets.len()))?;
+        crate::record::require_names(&self.inputs)?;
+        crate::record::require_names(&self.outputs)?;
         self.validate_effects()?;
         if let Some(prediction) = &self.prediction {
             prediction.validate(self.numbers().len(), outputs)?;
@@ -343,6 +345,7 @@ impl Model {
                 return Err(Error::ModelFile { reason: "it names no `schema`".to_owned() });
             }
         }
+        crate::record::require_texts(&value)?;
         let model: Self = serde_json::from_value(value).map_err(reason)?;
         // Built once more through the constructors, which refuse what does not fit together.
         for hysteresis in &model.hysteresis {

@@ -1,7 +1,7 @@
 //! Measured records.
 
 use crate::arrays::{experiments, from_matrix, vector};
-use crate::channels::{channels, label, names, units};
+use crate::channels::{Label, channels, label, names, units};
 use crate::errors::{parameter, to_python};
 use crate::plotting::{in_notebook, plot};
 use gpi_core::{Experiment, Matrix, TimeAxis};
@@ -61,12 +61,12 @@ impl Record {
         rate: f64,
         covariates: Option<&Bound<'_, PyAny>>,
         warmup: Option<Warmup>,
-        input_names: Option<Vec<String>>,
-        output_names: Option<Vec<String>>,
-        covariate_names: Option<Vec<String>>,
-        input_units: Option<Vec<String>>,
-        output_units: Option<Vec<String>>,
-        covariate_units: Option<Vec<String>>,
+        input_names: Option<Vec<Label>>,
+        output_names: Option<Vec<Label>>,
+        covariate_names: Option<Vec<Label>>,
+        input_units: Option<Vec<Label>>,
+        output_units: Option<Vec<Label>>,
+        covariate_units: Option<Vec<Label>>,
     ) -> PyResult<Self> {
         let (u, y) = (experiments("u", u)?, experiments("y", y)?);
         let x = match covariates {

@@ -6,7 +6,6 @@ from typing import Annotated, Any
 import numpy as np
 import polars as pl
 import typer
-from rich.markup import escape
 from rich.table import Table
 
 from gpi_hammerstein import files
@@ -14,6 +13,7 @@ from gpi_hammerstein._native import Compensation, DataError, Model, ParameterErr
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import (
     console,
+    escape,
     picture,
     print_json,
     say_written,
@@ -21,6 +21,7 @@ from gpi_hammerstein.cli.output import (
     write_json,
 )
 from gpi_hammerstein.cli.simulate import ModelFile
+from gpi_hammerstein.escaping import in_cell
 from gpi_hammerstein.io import Recording, read_recording
 
 ReferenceFile = Annotated[
@@ -155,11 +156,14 @@ def compensate(
     screen = console()
     unit = model.output_units[0] if len(set(model.output_units)) == 1 else ""
     screen.print(expected_table(found, unit))
-    screen.print(expected_sentence(found, unit))
+    screen.print(escape(expected_sentence(found, unit)))
     for name, row in result["drive"].items():
+        unit_in = row["unit"]
         screen.print(
-            f"The range of {name} is {row['lowest']:.4g} to {row['highest']:.4g} {row['unit']}, and its "
-            f"largest slope is {row['fastest']:.4g} {row['unit']}/s."
+            escape(
+                f"The range of {name} is {row['lowest']:.4g} to {row['highest']:.4g} {unit_in}, and its "
+                f"largest slope is {row['fastest']:.4g} {unit_in}/s."
+            )
             + ("" if limits else " No limits were given (--limits).")
         )
     for effect, why in found.left:
@@ -188,7 +192,7 @@ def expected_table(found: Compensation, unit: str) -> Table:
     expected = found.expected_error
     table = Table(title="Expected error of the stage, without the noise of the sensor")
     table.add_column("part")
-    table.add_column("rms" + (f" / {unit}" if unit else ""), justify="right")
+    table.add_column("rms" + (f" / {escape(unit)}" if unit else ""), justify="right")
     for name, what in PARTS.items():
         part = expected["parts"][name]
         table.add_row(what, "not known" if part is None else f"{part:.4g}")
@@ -287,7 +291,7 @@ def drive_table(model: Model, found: Compensation) -> pl.DataFrame:
     """Return a table with columns for the time, the drives, the references and the predictions."""
     table = {"t": found.time}
     for name, values in zip(model.input_names, columns(found.drive), strict=True):
-        table[name] = values
+        table[in_cell(name)] = values
     signals = {
         "reference": found.reference,
         "predicted": found.predicted,

@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.markup import escape
 from rich.table import Table
 
 from gpi_hammerstein import files
-from gpi_hammerstein.cli.output import console, print_json, working
+from gpi_hammerstein.cli.output import console, escape, print_json, working
+from gpi_hammerstein.escaping import in_cell
 
 datasets: typer.Typer = typer.Typer(
     no_args_is_help=True, help="List and download measured records that anybody may use."
@@ -63,7 +63,7 @@ def fetch(name: Name, part: Part = None, out: Out = Path(".")) -> None:
     names = [f"{name}-{own}.csv"] if count == 1 else [f"{name}-{own}-{i}.csv" for i in range(count)]
     with files.staged(out) as folder:
         for experiment, file in enumerate(names):
-            to_polars(record, experiment).write_csv(folder / file)
+            to_polars(record, experiment).rename(in_cell).write_csv(folder / file)
     screen = console()
     screen.print(f"{escape(dataset.what)}. By {escape(dataset.authors)}, {dataset.licence}: {dataset.home}")
     if any(record.warmup):

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
 
 import gpi_hammerstein._native as native
 from gpi_hammerstein._native import Explanation
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.explain import before_and_after, write_results
 from gpi_hammerstein.cli.identification import describe_model
-from gpi_hammerstein.cli.output import console, print_json, progress_bar, say_written
+from gpi_hammerstein.cli.output import console, escape, print_json, progress_bar, say_written
 from gpi_hammerstein.cli.validate import residual_figures
 from gpi_hammerstein.explanation import in_words, join, to_dict
 from gpi_hammerstein.held_out import rule_of

@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 import gpi_hammerstein._native as native
@@ -18,6 +17,7 @@ from gpi_hammerstein.cli.output import (
     console,
     describe_record,
     error_table,
+    escape,
     picture,
     print_json,
     progress_bar,

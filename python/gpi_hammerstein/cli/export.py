@@ -4,12 +4,11 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.markup import escape
 
 from gpi_hammerstein import files
 from gpi_hammerstein._native import ParameterError
 from gpi_hammerstein.cli.compensate import read_pair
-from gpi_hammerstein.cli.output import console
+from gpi_hammerstein.cli.output import console, escape
 from gpi_hammerstein.cli.simulate import ModelFile
 from gpi_hammerstein.export import export_c, export_rust
 

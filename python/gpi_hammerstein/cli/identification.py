@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from gpi_hammerstein._native import Identification, Model, Refinement
-from gpi_hammerstein.cli.output import error_table, rival_table, say_written
+from gpi_hammerstein.cli.output import error_table, escape, rival_table, say_written
 from gpi_hammerstein.comparison import compared_in_words
 
 HOW = {

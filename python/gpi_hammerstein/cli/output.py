@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
+from rich.markup import escape as escape_markup
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from gpi_hammerstein._native import GpiError, Record
 from gpi_hammerstein.comparison import rival_rows
+from gpi_hammerstein.escaping import visible
 from gpi_hammerstein.io import Recording
 
 if TYPE_CHECKING:
@@ -24,13 +25,18 @@ if TYPE_CHECKING:
 Figures = Mapping[str, float] | None
 
 
+def escape(text: str) -> str:
+    """Return a text that the console prints as it is: without markup, with visible control characters."""
+    return "\n".join(escape_markup(visible(line)) for line in text.split("\n"))
+
+
 def complain(problem: Exception | str, code: int) -> int:
     """Print an error message of one line on stderr, and return the exit code."""
     if isinstance(problem, Exception) and not isinstance(problem, GpiError):
         text = f"{type(problem).__name__}: {problem} (GPI_DEBUG=1 shows the traceback)"
     else:
         text = str(problem)
-    print(f"gpi: {text}", file=sys.stderr)
+    print("gpi: " + "\n".join(map(visible, text.split("\n"))), file=sys.stderr)
     return code
 
 
@@ -112,17 +118,17 @@ def describe_record(recording: Recording, files: Sequence[Path | str]) -> dict[s
 
 def error_table(rows: Mapping[str, Figures], unit: str = "", title: str = "Simulation error") -> Table:
     """Return a table of error figures, with one row for each data set."""
-    table = Table(title=title, title_justify="left")
+    table = Table(title=escape(title), title_justify="left")
     table.add_column("")
     label = f" [{unit}]" if unit else ""
     for name in (f"rms{label}", "rms / span", "fit", f"largest{label}"):
         table.add_column(escape(name), justify="right")
     for name, figures in rows.items():
         if figures is None:
-            table.add_row(name, *["-"] * 4)
+            table.add_row(escape(name), *["-"] * 4)
             continue
         table.add_row(
-            name,
+            escape(name),
             f"{figures['rms']:.4g}",
             f"{100 * figures['nrmse']:.3g} %",
             f"{figures['fit_percent']:.2f} %",
@@ -162,4 +168,4 @@ def picture(path: Path, draw: Callable[["Axes"], object], width: float = 8.0, he
 def say_written(screen: Console, out: Path | None, files: Sequence[str]) -> None:
     """Print the names of the files that were written."""
     if out is not None:
-        screen.print(f"Written to {escape(str(out))}: {', '.join(files)}")
+        screen.print(f"Written to {escape(str(out))}: {escape(', '.join(files))}")

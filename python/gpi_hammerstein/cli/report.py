@@ -4,12 +4,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.markup import escape
 
 from gpi_hammerstein._native import ParameterError
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.explain import explained, split_effects
-from gpi_hammerstein.cli.output import common_unit, console, working
+from gpi_hammerstein.cli.output import common_unit, console, escape, working
 from gpi_hammerstein.explanation import in_words, to_dict
 
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File for the page.")]

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.markup import escape
 from rich.table import Table
 
-from gpi_hammerstein.cli.output import picture
+from gpi_hammerstein.cli.output import escape, picture
 from gpi_hammerstein.uncertain import OF_SIZE, p_value_in_words
 
 if TYPE_CHECKING:

@@ -16,6 +16,7 @@ from gpi_hammerstein.cli.output import (
     console,
     describe_record,
     error_table,
+    escape,
     print_json,
     say_written,
     working,
@@ -100,7 +101,7 @@ def simulate(
         return
     screen = console()
     for note in recording.notes:
-        screen.print(f"[yellow]note[/] {note}", markup=True)
+        screen.print(f"[yellow]note[/] {escape(note)}")
     if record is None:
         screen.print("The record has no output column, so that no error can be computed.")
     else:

@@ -5,7 +5,6 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from numpy.typing import NDArray
-from rich.markup import escape
 
 from gpi_hammerstein import files
 from gpi_hammerstein._native import Model, Record, residual_tests
@@ -15,6 +14,7 @@ from gpi_hammerstein.cli.output import (
     console,
     describe_record,
     error_table,
+    escape,
     print_json,
     say_written,
     working,

@@ -6,13 +6,16 @@ The source code contains the parameters of :meth:`Model.compensator`. It needs n
 import hashlib
 import os
 import re
+from collections.abc import Callable
 from importlib.resources import files as resources
 from string import Template
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gpi_hammerstein._native import Compensator, Model, ParameterError, __version__
+from gpi_hammerstein.escaping import in_c, in_rust
 from gpi_hammerstein.files import staged, write_atomically
 
 __all__ = ["export_c", "export_rust"]
@@ -51,8 +54,8 @@ def export_c(
     Raises
     ------
     ParameterError
-        The limits leave no range, the hysteresis has no inverse, the name is not a valid C identifier, or the
-        folder cannot be written.
+        The limits leave no range, the hysteresis has no inverse, the precision is too low for a parameter,
+        the name is not a valid C identifier, or the folder cannot be written.
     DataError
         The model has several inputs or outputs.
 
@@ -73,10 +76,12 @@ def export_c(
     real, largest, suffix = ("float", "FLT_MAX", "f") if precision == "single" else ("double", "DBL_MAX", "")
     numbers = written_numbers(compensator, precision, largest, suffix)
     numbers |= {"real": real, "largest": largest, "name": name, "NAME": name.upper()}
-    numbers |= described(model, compensator, " * ")
+    numbers |= described(model, compensator, " * ", in_c)
     with staged(folder) as place:
         for ending in ("h", "c"):
-            (place / f"{name}.{ending}").write_text(filled(f"compensator.{ending}", compensator, numbers))
+            (place / f"{name}.{ending}").write_text(
+                filled(f"compensator.{ending}", compensator, numbers), encoding="utf-8"
+            )
     return compensator
 
 
@@ -108,7 +113,8 @@ def export_rust(
     Raises
     ------
     ParameterError
-        The limits leave no range, the hysteresis has no inverse, or the file cannot be written.
+        The limits leave no range, the hysteresis has no inverse, the precision is too low for a parameter, or
+        the file cannot be written.
     DataError
         The model has several inputs or outputs.
 
@@ -119,7 +125,7 @@ def export_rust(
     compensator = model.compensator(limits=limits)
     real = "f32" if precision == "single" else "f64"
     numbers = written_numbers(compensator, precision, "Real::INFINITY", "") | {"real": real}
-    numbers |= described(model, compensator, "//! ")
+    numbers |= described(model, compensator, "//! ", in_rust)
     write_atomically(file, filled("compensator.rs", compensator, numbers))
     return compensator
 
@@ -133,7 +139,8 @@ def written_numbers(
     number = np.float32 if precision == "single" else np.float64
 
     def written(value: float) -> str:
-        rounded = number(value)
+        with np.errstate(over="ignore"):
+            rounded = number(value)
         if np.isinf(rounded):
             return f"-{infinity}" if rounded < 0 else infinity
         text = str(rounded)
@@ -155,7 +162,28 @@ def written_numbers(
         "heights": heights,
         "slopes": slopes,
     }
+    standing_gain = float(sum(compensator.creep_gains, start=compensator.gain))
+    lowest_v, highest_v = compensator.range
+    safe_below, safe_above = inverse.safe
+    finite: dict[str, ArrayLike] = {
+        **arrays,
+        "gain": compensator.gain,
+        "standing_gain": standing_gain,
+        "offset": compensator.offset,
+        "range": compensator.range,
+        # the largest sum and the largest drive within this range
+        "sum": np.sum(np.abs(plays.weights)) * np.array(compensator.range),
+        "drive": np.max(np.abs(slopes)) * np.sum(np.abs(plays.weights)) * np.array(compensator.range),
+    }
+    for what, values in finite.items():
+        require_written(what, values, number)
+    rates = compensator.creep_rates
+    coupling = float(np.sum(rates * np.abs(compensator.creep_gains / compensator.gain)))
+    recovery = (highest_v - lowest_v) * coupling
+    edges = [compensator.offset + standing_gain * v for v in (lowest_v, highest_v)]
     pairs = {
+        ("lowest_v", "highest_v"): (lowest_v, highest_v),
+        ("usual_below", "usual_above"): (max(lowest_v, safe_below), min(highest_v, safe_above)),
         ("lowest_drive", "highest_drive"): inverse.limits,
         ("lowest", "highest"): inverse.reach,
         ("safe_below", "safe_above"): inverse.safe,
@@ -163,34 +191,62 @@ def written_numbers(
     scalars = {
         "offset": compensator.offset,
         "gain": compensator.gain,
-        "standing_gain": sum(compensator.creep_gains, start=compensator.gain),
+        "standing_gain": standing_gain,
     }
     for names, values in pairs.items():
         scalars |= dict(zip(names, values, strict=True))
     counts = {"plays": len(plays.weights), "knot_count": len(knots), "lags": len(compensator.creep_rates)}
+    said = {
+        "v_range": f"{lowest_v:g} .. {highest_v:g}",
+        "widest": f"{2 * max(plays.half_widths):g}",
+        "rest": f"{compensator.offset:g}",
+        "lowest_reference": f"{min(edges):g}",
+        "highest_reference": f"{max(edges):g}",
+        "recovery": f"{recovery:.3g}",
+        "decay": f"{1 - min(rates, default=0.0):.9g}",
+    }
     return (
-        {key: listed(values) for key, values in arrays.items()}
+        said
+        | {key: listed(values) for key, values in arrays.items()}
         | {key: written(value) for key, value in scalars.items()}
         | {key: str(count) for key, count in counts.items()}
     )
 
 
-def described(model: Model, compensator: Compensator, begin: str) -> dict[str, str]:
+def require_written(name: str, values: ArrayLike, number: type[np.floating[Any]]) -> None:
+    """Reject a parameter that becomes infinite in this precision, and a gain whose reciprocal does."""
+    with np.errstate(over="ignore", under="ignore"):
+        rounded = np.asarray(values, dtype=np.float64).astype(number)
+    if not np.isfinite(rounded).all() or (
+        name.endswith("gain") and not np.all(np.abs(rounded) > np.finfo(number).tiny)
+    ):
+        precision = "single" if number is np.float32 else "double"
+        raise ParameterError(
+            f"`precision` = {precision}: `{name}` of the compensator is not a normal number in it; "
+            "use double precision or other units"
+        )
+
+
+def described(
+    model: Model, compensator: Compensator, begin: str, escaped: Callable[[str], str]
+) -> dict[str, str]:
     """Return the title, the properties of the model as comments, and the units."""
     input_unit, output_unit = model.input_units[0], model.output_units[0]
+    input_unit, output_unit = escaped(input_unit), escaped(output_unit)
+    input_name, output_name = escaped(model.input_names[0]), escaped(model.output_names[0])
     low, high = compensator.hysteresis.limits
     between = "without limits" if np.isinf([low, high]).all() else f"from {low:g} to {high:g} {input_unit}"
     facts = [
         f"Model: SHA-256 {hashlib.sha256(model.to_json().encode()).hexdigest()} of its file.",
         f"Rate: {model.rate:g} samples a second.",
-        f"Reference: {model.output_names[0]}{in_unit(output_unit)}.",
-        f"Drive: {model.input_names[0]}{in_unit(input_unit)}, {between}.",
+        f"Reference: {output_name}{in_unit(output_unit)}.",
+        f"Drive: {input_name}{in_unit(input_unit)}, {between}.",
         f"Compensated: {', '.join(compensator.compensated)}.",
         *(f"Not compensated: {part}: {why}." for part, why in compensator.left),
         f"Made by gpi-hammerstein {__version__}, `gpi export`.",
     ]
     return {
-        "title": f"Compensator: drive of {model.input_names[0]} for a reference of {model.output_names[0]}",
+        "title": f"Compensator: drive of {input_name} for a reference of {output_name}",
         "facts": "\n".join((begin + fact).rstrip() for fact in facts),
         "input_unit": in_unit(input_unit),
         "output_unit": in_unit(output_unit),

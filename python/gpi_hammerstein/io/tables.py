@@ -10,6 +10,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from gpi_hammerstein._native import DataError
+from gpi_hammerstein.escaping import visible
 from gpi_hammerstein.io.columns import Column, parse_header
 from gpi_hammerstein.io.header import DECIMAL_COMMA, find_header, is_number
 
@@ -47,9 +48,9 @@ class Table:
             if column in self.text:
                 row, cell = self.text[column]
                 raise DataError(
-                    f"{self.source}: column `{column.header}` holds text, first `{cell}` in row {row} "
-                    "(the rows below the names are counted from 0); correct or remove such rows; if the "
-                    "column is no input, output or time, ignore it (covariate=[], --covariate none)"
+                    f"{self.source}: column `{column.header}` holds text, first `{visible(cell)}` in row "
+                    f"{row} (the rows below the names are counted from 0); correct or remove such rows; if "
+                    "the column is no input, output or time, ignore it (covariate=[], --covariate none)"
                 )
             rows = np.flatnonzero(~np.isfinite(self.columns[column]))
             if rows.size:

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from gpi_hammerstein._native import Explanation, Model, Record
+from gpi_hammerstein.escaping import in_plot
 from gpi_hammerstein.io import raise_warmup
 from gpi_hammerstein.plot.explanation import title
 from gpi_hammerstein.plot.style import BLACK, BLUE, ORANGE, axes, label
@@ -192,7 +193,7 @@ def residual_in_time(
     warmup, rate = found.record.warmup[experiment], found.record.rate
     for name, color, values in found.of(experiment, output):
         t = np.arange(len(values)) / rate
-        text = f"{name}: {rms(values[warmup:]):.3g} {found.record.output_units[output]} rms"
+        text = f"{name}: {rms(values[warmup:]):.3g} {in_plot(found.record.output_units[output])} rms"
         ax.plot(t, values, color=color, lw=0.6, label=text)
     for first, last in [(0, warmup)] * (warmup > 0) + found.held_out[experiment]:
         ax.axvspan(first / rate, (last - 1) / rate, color=BLACK, alpha=0.08, lw=0)
@@ -306,7 +307,7 @@ def residual_autocorrelation(
     ax.axhspan(-bound, bound, color=BLACK, alpha=0.12, lw=0, label="95 % of white noise")
     ax.axhline(0.0, color=BLACK, lw=0.5)
     ax.set_xlabel("lag [samples]")
-    ax.set_ylabel(f"autocorrelation of the residual of {found.record.output_names[output]} [-]")
+    ax.set_ylabel(f"autocorrelation of the residual of {in_plot(found.record.output_names[output])} [-]")
     ax.set_title(found.title)
     ax.legend(loc="upper right")
     return ax

@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
 
 from gpi_hammerstein._native import Identification, Model, Refinement
+from gpi_hammerstein.escaping import in_plot
 from gpi_hammerstein.plot.style import (
     ABOVE_LEGEND,
     BLUE,
@@ -107,12 +108,14 @@ def history(found: Model | Refinement, ax: Axes | None = None) -> Axes:
         say_nothing_to_draw(ax, f"no steps: {why}")
         return ax
     steps = refinement.history
-    ax.plot(np.arange(len(steps)), steps, "o-", ms=3, lw=1.0, color=BLUE, label=refinement.status)
+    ax.plot(np.arange(len(steps)), steps, "o-", ms=3, lw=1.0, color=BLUE, label=in_plot(refinement.status))
     if steps.max() > 10 * steps.min():
         ax.set_yscale("log")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     if len(refinement.residual_rms) == 1:
         floor = refinement.noise_floor
-        ax.axhline(floor["rms"][0], color=VERMILION, ls="--", lw=1.0, label=f"noise floor: {floor['how']}")
+        ax.axhline(
+            floor["rms"][0], color=VERMILION, ls="--", lw=1.0, label=f"noise floor: {in_plot(floor['how'])}"
+        )
     ax.legend()
     return ax

@@ -10,6 +10,7 @@ from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
 from gpi_hammerstein._native import Refinement
+from gpi_hammerstein.escaping import in_plot
 from gpi_hammerstein.uncertain import BAND
 
 # The palette of Okabe and Ito, which can be distinguished with every kind of colour vision.
@@ -34,7 +35,7 @@ def axes(ax: Axes | None, width: float = 7.0, height: float = 4.0) -> Axes:
 
 def label(name: str, unit: str) -> str:
     """Return the name of an axis with its unit in brackets."""
-    return f"{name} [{unit}]" if unit else name
+    return in_plot(f"{name} [{unit}]" if unit else name)
 
 
 def line_style(index: int) -> tuple[str, str]:

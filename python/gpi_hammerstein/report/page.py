@@ -1,5 +1,7 @@
 """The HTML page of a report."""
 
+import base64
+import hashlib
 import os
 from collections.abc import Sequence
 from html import escape
@@ -57,8 +59,11 @@ def report_html(found: Explanation, *, command: str | None = None, notes: Sequen
     def shown(part: str) -> str:
         return "".join(figure(*one) for one in drawn if one[0].startswith(PARTS[part]))
 
+    script = files("gpi_hammerstein.report").joinpath("page.js").read_text("utf-8")
     title = f"{', '.join(record.input_names)} → {', '.join(record.output_names)}"
     return Template(files("gpi_hammerstein.report").joinpath("page.html").read_text("utf-8")).substitute(
+        policy=policy(script),
+        script=script,
         title=escape(title),
         verdict=escape(found.verdict),
         verdict_words=VERDICTS[found.verdict],
@@ -80,6 +85,24 @@ def report_html(found: Explanation, *, command: str | None = None, notes: Sequen
         command=f"<pre>{escape(command)}</pre>" if command else "",
         version=escape(__version__),
     )
+
+
+def policy(script: str) -> str:
+    """Return the content security policy of a page with one script.
+
+    The page loads nothing, sends nothing, and runs this script only. Pictures have style attributes, and the
+    points of large pictures are embedded images.
+    """
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    rules = {
+        "default-src": "'none'",
+        "script-src": f"'sha256-{digest}'",
+        "style-src": "'unsafe-inline'",
+        "img-src": "data:",
+        "base-uri": "'none'",
+        "form-action": "'none'",
+    }
+    return "; ".join(f"{name} {value}" for name, value in rules.items())
 
 
 def figure(key: str, what: str, svg: str) -> str:

@@ -18,7 +18,7 @@ mod storage;
 pub use cascade::{Gpi, GpiState};
 pub use deadzones::{Deadzones, DeadzonesState, Reading};
 pub use error::OperatorError;
-pub use inverse::{Compensator, CompensatorState, Curve, InverseGpi, InverseState};
+pub use inverse::{Compensator, CompensatorState, Curve, Faults, InverseGpi, InverseState};
 pub use lags::{Lags, LagsState};
 pub use plays::{PlayBank, PlayBankState, play};
 pub use state_space::StateSpaceStep;

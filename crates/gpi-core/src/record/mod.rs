@@ -2,6 +2,7 @@
 
 mod channel;
 mod experiment;
+mod names;
 mod time_axis;
 
 pub use channel::Channel;
@@ -9,6 +10,7 @@ pub use experiment::Experiment;
 pub use time_axis::TimeAxis;
 
 pub(crate) use channel::require_finite;
+pub(crate) use names::{require_names, require_texts};
 
 use crate::{Error, Matrix};
 use std::ops::Range;
@@ -38,7 +40,8 @@ impl Record {
     ///
     /// # Errors
     /// There is no experiment, input or output; the rate is not positive; the columns of an experiment differ in length,
-    /// or in number from the channels; a sample is NaN or infinite; the warm-up leaves no scored sample.
+    /// or in number from the channels; a sample is NaN or infinite; the warm-up leaves no scored sample; a name or a unit
+    /// has a control character or a mark that changes the direction of writing.
     pub fn new(
         experiments: Vec<Experiment>,
         rate: f64,
@@ -47,6 +50,9 @@ impl Record {
         covariates: Vec<Channel>,
     ) -> Result<Self, Error> {
         Error::require_positive("rate", rate, "the sampling rate in Hz must be positive")?;
+        for channels in [&inputs, &outputs, &covariates] {
+            require_names(channels)?;
+        }
         Error::require_samples(experiments.len(), 1, "a record holds at least one experiment")?;
         for experiment in &experiments {
             for (name, matrix, channels) in [

@@ -4,7 +4,7 @@ use crate::arrays::from_vector;
 use crate::errors::{parameter, to_python};
 use crate::operators::{InverseGpi, by_channel, read_inverse_state, write_inverse_state};
 use gpi_core::compensate::StreamingCompensator;
-use gpi_core::operators::{CompensatorState, LagsState, Operator};
+use gpi_core::operators::{CompensatorState, Faults, LagsState, Operator};
 use pyo3::prelude::*;
 
 type State = CompensatorState<Vec<f64>, Vec<f64>>;
@@ -62,6 +62,13 @@ impl Compensator {
         from_vector(py, self.found.compensator.creep().gains())
     }
 
+    /// Lowest and highest v, in the unit of v. A reference that needs a v outside of this range is taken as a fault: v is
+    /// set to the nearest end.
+    #[getter]
+    fn range(&self) -> (f64, f64) {
+        self.found.compensator.range().into()
+    }
+
     /// Names of the parts of the model that the drive compensates.
     #[getter]
     fn compensated(&self) -> Vec<&'static str> {
@@ -98,7 +105,8 @@ impl Compensator {
     /// Parameters
     /// ----------
     /// reference : array_like, shape (samples,)
-    ///     Desired output, in its unit, at the model's rate. The drive is held at samples that are not finite.
+    ///     Desired output, in its unit, at the model's rate. The drive is held at samples that are not finite, and v is
+    ///     limited to ``range``.
     /// state : array_like, shape (2 + plays + 2 lags,)
     ///     The state that ``standing_at`` or the last call returned, each number in its own unit.
     ///
@@ -163,6 +171,7 @@ impl Compensator {
                 .map_err(to_python)?,
             creep: LagsState { lags: lags.to_vec(), carried: carried.to_vec() },
             drive: values[0],
+            faults: Faults::default(),
         })
     }
 }

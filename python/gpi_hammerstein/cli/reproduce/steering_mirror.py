@@ -6,13 +6,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
-from rich.markup import escape
 from rich.table import Table
 
 from gpi_hammerstein import files
 from gpi_hammerstein._native import Model
 from gpi_hammerstein.cli import options
-from gpi_hammerstein.cli.output import console, picture, print_json, progress_bar, say_written, write_json
+from gpi_hammerstein.cli.output import (
+    console,
+    escape,
+    picture,
+    print_json,
+    progress_bar,
+    say_written,
+    write_json,
+)
 from gpi_hammerstein.explanation import in_words, to_dict
 from gpi_hammerstein.reproduce.steering_mirror import (
     HELD_OUT,

@@ -35,6 +35,12 @@ static const real knots[KNOTS] = {$knots};
 static const real heights[KNOTS] = {$heights};
 static const real slopes[KNOTS + 1] = {$slopes};
 
+/* The range of v, and the part of it in which neither this range nor a limit of the drive is reached. */
+static const real lowest_v = $lowest_v;
+static const real highest_v = $highest_v;
+static const real usual_below = $usual_below;
+static const real usual_above = $usual_above;
+
 /* The limits of the drive, the corresponding inputs of the inverse deadzones, and the range of v in which no limit is reached. */
 static const real lowest_drive = $lowest_drive;
 static const real highest_drive = $highest_drive;
@@ -134,9 +140,13 @@ static real input_for(const real *places, real output)
     return slope > 0 ? v + (output - reached) / slope : v;
 }
 
-/* Moves the plays to v, or to the nearest v that can be reached, and sets the drive. */
-static real move(${name}_state *state, real v)
+/* Moves the plays to the nearest v that can be reached. */
+static real move_far(${name}_state *state, real v)
 {
+    if (v < lowest_v || v > highest_v) {
+        v = clamp(v, lowest_v, highest_v);
+        state->faults |= ${NAME}_SATURATED;
+    }
     if (v < safe_below || v > safe_above) {
         real z = 0, within;
         int i;
@@ -155,6 +165,33 @@ static real move(${name}_state *state, real v)
     return v;
 }
 
+/* Moves the plays to v, or to the nearest v that can be reached, and sets the drive. */
+static real move(${name}_state *state, real v)
+{
+    if (v < usual_below || v > usual_above)
+        return move_far(state, v);
+    state->drive = drive_for(step_plays(state->plays, v));
+    return v;
+}
+
+static int is_finite(real reference)
+{
+    return reference >= -$largest && reference <= $largest;
+}
+@creep
+
+static void creep_on(${name}_state *state, real v)
+{
+    int i;
+    for (i = 0; i < LAGS; ++i) {
+        const real wanted = lag_rates[i] * (v - state->lags[i]) + state->carried[i];
+        const real there = state->lags[i] + wanted;
+        state->carried[i] = wanted - (there - state->lags[i]);
+        state->lags[i] = there;
+    }
+}
+@end
+
 void ${name}_start(${name}_state *state, ${name}_real reference)
 {
     int i;
@@ -163,6 +200,11 @@ void ${name}_start(${name}_state *state, ${name}_real reference)
 @end
     for (i = 0; i < PLAYS; ++i)
         state->plays[i] = 0;
+    state->faults = 0;
+    if (!is_finite(reference)) {
+        reference = offset;
+        state->faults |= ${NAME}_NOT_FINITE;
+    }
 @creep
     v = move(state, (reference - offset) / standing_gain);
     for (i = 0; i < LAGS; ++i) {
@@ -181,18 +223,15 @@ ${name}_real ${name}_step(${name}_state *state, ${name}_real reference)
     real creep = 0, v;
     int i;
 @end
-    if (!(reference >= -$largest && reference <= $largest))
+    if (!is_finite(reference)) {
+        state->faults |= ${NAME}_NOT_FINITE;
         return state->drive;
+    }
 @creep
     for (i = 0; i < LAGS; ++i)
         creep += lag_gains[i] * state->lags[i];
     v = move(state, (reference - offset - creep) / gain);
-    for (i = 0; i < LAGS; ++i) {
-        const real wanted = lag_rates[i] * (v - state->lags[i]) + state->carried[i];
-        const real there = state->lags[i] + wanted;
-        state->carried[i] = wanted - (there - state->lags[i]);
-        state->lags[i] = there;
-    }
+    creep_on(state, v);
 @else
     move(state, (reference - offset) / gain);
 @end

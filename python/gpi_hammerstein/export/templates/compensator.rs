@@ -3,6 +3,8 @@
 $facts
 
 #![forbid(unsafe_code)]
+// a program need not use every function
+#![allow(dead_code)]
 
 /// The number type.
 pub type Real = $real;
@@ -42,7 +44,35 @@ const HIGHEST: Real = $highest;
 const SAFE_BELOW: Real = $safe_below;
 const SAFE_ABOVE: Real = $safe_above;
 
+// The range of v, and the part of it in which neither this range nor a limit of the drive is reached.
+const LOWEST_V: Real = $lowest_v;
+const HIGHEST_V: Real = $highest_v;
+const USUAL_BELOW: Real = $usual_below;
+const USUAL_ABOVE: Real = $usual_above;
+
+/// What was wrong with the references since the flags were last cleared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Faults {
+    /// A reference was NaN or infinite: the drive was held.
+    pub not_finite: bool,
+    /// A reference needed a v outside of the range: v was set to the nearest end.
+    pub saturated: bool,
+}
+
 /// Computes the drive from a reference; contains the state between two samples.
+///
+/// What happens at bad samples:
+///
+/// - The drive and the state are finite after every sequence of references, and the drive is within its limits.
+/// - A reference that is NaN or infinite changes neither the drive nor the state. [`Compensator::standing_at`] takes it as $rest,
+///   where v = 0.
+/// - v is limited to $v_range. In the steady state, these are the references
+///   $lowest_reference .. $highest_reference. A drive at its limit within this range is no fault.
+/// - [`Compensator::faults`] tells that one of the two has happened, until [`Compensator::clear_faults`].
+/// - After m bad and n good samples, v differs from the v without the bad samples by at most m * $recovery * $decay^n,
+///   apart from rounding errors, if all gains of creep have the sign of the gain.
+///   The plays return to the same state when v has moved up and down by twice the largest half-width, $widest. Until
+///   then, the drive is the right one for the actuator, which has followed the drive too.
 #[derive(Clone, Debug)]
 pub struct Compensator {
     plays: [Real; PLAYS],
@@ -53,29 +83,33 @@ pub struct Compensator {
 @end
     drive: Real,
     out_of_reach: u32,
+    faults: Faults,
 }
 
 impl Compensator {
     /// Returns the steady state after the actuator has moved from zero to this reference$output_unit.
     pub fn standing_at(reference: Real) -> Self {
+        let faults = Faults { not_finite: !reference.is_finite(), saturated: false };
+        let reference = if faults.not_finite { OFFSET } else { reference };
 @creep
         let (lags, carried) = ([0.0; LAGS], [0.0; LAGS]);
-        let mut own = Self { plays: [0.0; PLAYS], lags, carried, drive: 0.0, out_of_reach: 0 };
+        let mut own = Self { plays: [0.0; PLAYS], lags, carried, drive: 0.0, out_of_reach: 0, faults };
         let v = own.go_to((reference - OFFSET) / STANDING_GAIN);
         own.lags = [v; LAGS];
 @else
-        let mut own = Self { plays: [0.0; PLAYS], drive: 0.0, out_of_reach: 0 };
+        let mut own = Self { plays: [0.0; PLAYS], drive: 0.0, out_of_reach: 0, faults };
         own.go_to((reference - OFFSET) / STANDING_GAIN);
 @end
         own.out_of_reach = 0;
         own
     }
 
-    /// Returns the drive$input_unit for the next sample of the reference$output_unit. If the reference is not finite, the drive
-    /// does not change.
+    /// Returns the drive$input_unit for the next sample of the reference$output_unit. See [`Compensator`] for
+    /// bad samples.
     #[inline]
     pub fn step(&mut self, reference: Real) -> Real {
         if !reference.is_finite() {
+            self.faults.not_finite = true;
             return self.drive;
         }
 @creep
@@ -84,12 +118,7 @@ impl Compensator {
             creep += gain * lag;
         }
         let v = self.go_to((reference - OFFSET - creep) / GAIN);
-        for (rate, (lag, carried)) in LAG_RATES.iter().zip(self.lags.iter_mut().zip(&mut self.carried)) {
-            let wanted = rate * (v - *lag) + *carried;
-            let there = *lag + wanted;
-            *carried = wanted - (there - *lag);
-            *lag = there;
-        }
+        self.creep_on(v);
 @else
         self.go_to((reference - OFFSET) / GAIN);
 @end
@@ -101,18 +130,46 @@ impl Compensator {
         self.out_of_reach
     }
 
+    /// Returns what was wrong with the references.
+    pub fn faults(&self) -> Faults {
+        self.faults
+    }
+
+    /// Clears the faults.
+    pub fn clear_faults(&mut self) {
+        self.faults = Faults::default();
+    }
+@creep
+
+    #[inline]
+    fn creep_on(&mut self, v: Real) {
+        for (rate, (lag, carried)) in LAG_RATES.iter().zip(self.lags.iter_mut().zip(&mut self.carried)) {
+            let wanted = rate * (v - *lag) + *carried;
+            let there = *lag + wanted;
+            *carried = wanted - (there - *lag);
+            *lag = there;
+        }
+    }
+@end
+
     /// Moves the plays to v, or to the nearest v that can be reached, and sets the drive.
     #[inline]
     fn go_to(&mut self, v: Real) -> Real {
-        if !(SAFE_BELOW..=SAFE_ABOVE).contains(&v) {
-            return self.go_to_limit(v);
+        if !(USUAL_BELOW..=USUAL_ABOVE).contains(&v) {
+            return self.go_far(v);
         }
         self.drive = drive_for(step_plays(&mut self.plays, v));
         v
     }
 
     #[cold]
-    fn go_to_limit(&mut self, v: Real) -> Real {
+    fn go_far(&mut self, wanted: Real) -> Real {
+        let v = clamp(wanted, LOWEST_V, HIGHEST_V);
+        self.faults.saturated |= v != wanted;
+        if (SAFE_BELOW..=SAFE_ABOVE).contains(&v) {
+            self.drive = drive_for(step_plays(&mut self.plays, v));
+            return v;
+        }
         let mut z = 0.0;
         for i in 0..PLAYS {
             z += WEIGHTS[i] * clamp(self.plays[i], v - HALF_WIDTHS[i], v + HALF_WIDTHS[i]);

@@ -92,6 +92,12 @@ where
 ///
 /// z is at most `v P' + sum_j (r'_j - r'_{j-1}) |p'_j + p'_{j+1} + ..|`, where P' is the sum of all weights p'_j.
 fn safe<S: Storage>(plays: &PlayBank<S>, reach: [S::Item; 2]) -> [S::Item; 2] {
+    let (slack, all) = slack(plays);
+    [(reach[0] + slack) / all, (reach[1] - slack) / all]
+}
+
+/// The largest difference between z and `v P'`, and P'.
+pub(super) fn slack<S: Storage>(plays: &PlayBank<S>) -> (S::Item, S::Item) {
     let zero = S::Item::ZERO;
     let (mut slack, mut tail) = (zero, zero);
     let (r, p) = (plays.half_widths(), plays.weights());
@@ -101,7 +107,7 @@ fn safe<S: Storage>(plays: &PlayBank<S>, reach: [S::Item; 2]) -> [S::Item; 2] {
         slack = slack + (wider - narrower) * tail.at_least(-tail);
     }
     let all = p.first().map_or(zero, |first| *first + tail);
-    [(reach[0] + slack) / all, (reach[1] - slack) / all]
+    (slack, all)
 }
 
 impl<E, S> InverseGpi<E, S>

@@ -5,7 +5,9 @@ mod cascade;
 mod compensator;
 mod curve;
 mod envelope;
+mod range;
 
 pub use cascade::{InverseGpi, InverseState};
 pub use compensator::{Compensator, CompensatorState};
 pub use curve::Curve;
+pub use range::Faults;
