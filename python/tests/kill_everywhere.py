@@ -10,8 +10,16 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+import kill_writes
 from gpi_hammerstein.files import exchange, require_folder, write_atomically
-from kill_writes import foreign_is_there, generations, kill_at_every_line, leftovers, make_foreign, write_generation
+from kill_writes import (
+    foreign_is_there,
+    generations,
+    kill_at_every_line,
+    leftovers,
+    make_foreign,
+    write_generation,
+)
 
 
 def situation(name: str, place: Path) -> tuple[Path, Callable[[], None], bool]:
@@ -31,7 +39,7 @@ def situation(name: str, place: Path) -> tuple[Path, Callable[[], None], bool]:
     return out, lambda: write_generation(out, 1), name == "exchange"
 
 
-def folder(name: str) -> int:
+def folder(name: str, stride: int) -> int:
     """Kill the writing of a folder everywhere, and return the number of kills."""
     with tempfile.TemporaryDirectory() as root:
         place = Path(root).resolve() / "place"
@@ -54,7 +62,7 @@ def folder(name: str) -> int:
             seen.update(found or {"none"})
             restore(backup, place)
 
-        kills = kill_at_every_line(work, check)
+        kills = kill_at_every_line(work, check, stride)
         # both generations were met, so that the kills were on both sides of the exchange
         assert seen == ({"none", "1"} if name == "new" else {"0", "1"}), seen
         os.chdir("/")
@@ -72,7 +80,7 @@ def restore(backup: Path, place: Path) -> None:
     shutil.copytree(backup, place, symlinks=True, dirs_exist_ok=True)
 
 
-def single() -> int:
+def single(stride: int) -> int:
     """Kill the writing of one file everywhere, and return the number of kills."""
     with tempfile.TemporaryDirectory() as root:
         path = Path(root) / "file.txt"
@@ -86,10 +94,12 @@ def single() -> int:
             write_atomically(path, "old" * 10_000)
             assert [file.name for file in Path(root).iterdir()] == ["file.txt"]
 
-        kills = kill_at_every_line(lambda: write_atomically(path, "new" * 10_000), check)
+        kills = kill_at_every_line(lambda: write_atomically(path, "new" * 10_000), check, stride)
         assert seen == {"old", "new"}
         return kills
 
 
 if __name__ == "__main__":
-    print(single() if sys.argv[1] == "single" else folder(sys.argv[1]))
+    kill_writes.FILES = 3
+    how, every = sys.argv[1], int(sys.argv[2])
+    print(single(every) if how == "single" else folder(how, every))

@@ -12,7 +12,7 @@ from gpi_hammerstein.files.require import require_folder
 from gpi_hammerstein.files.signals import deferred
 from gpi_hammerstein.files.single import flush_file, flush_folder
 from gpi_hammerstein.files.targets import refusal
-from gpi_hammerstein.files.temporary import held, temporary_folder
+from gpi_hammerstein.files.temporary import held, note_written, temporary_folder
 
 
 @contextmanager
@@ -58,6 +58,7 @@ def staged(out: str | os.PathLike[str]) -> Iterator[Path]:
             yield new
             with deferred():
                 _take_place(container, target, may_swap, out)
+                note_written()
     except OSError as error:
         raise refusal("out", out, error) from error
 

@@ -3,8 +3,9 @@
 import os
 from pathlib import Path
 
+from gpi_hammerstein.files import temporary
 from gpi_hammerstein.files.targets import keep_properties, real_file, refusal
-from gpi_hammerstein.files.temporary import HAS_LOCKS, sweep, temporary_file
+from gpi_hammerstein.files.temporary import HAS_LOCKS, note_written, sweep, temporary_file
 
 
 def write_atomically(path: str | os.PathLike[str], content: bytes | str) -> None:
@@ -47,6 +48,8 @@ def write_atomically(path: str | os.PathLike[str], content: bytes | str) -> None
             if not HAS_LOCKS:
                 os.close(handle)  # Windows renames no open file
             os.replace(file, target)
+            if not any(folder in temporary.live for folder in target.parents):
+                note_written()
             flush_folder(target.parent)
     except OSError as error:
         raise refusal("path", path, error) from error

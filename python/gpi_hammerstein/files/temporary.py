@@ -34,6 +34,7 @@ PAUSE_SECONDS = 0.01
 
 # The temporary files and folders of this process, which `abandon` removes.
 live: set[Path] = set()
+_written: list[bool] = []
 
 
 def new_path(folder: Path) -> Path:
@@ -140,6 +141,16 @@ def temporary_folder(folder: Path) -> Iterator[Path]:
             if handle >= 0:
                 os.close(handle)
             live.discard(path)
+
+
+def is_untouched() -> bool:
+    """Return whether this process has written no results yet."""
+    return not _written
+
+
+def note_written() -> None:
+    """Note that results have taken their place."""
+    _written.append(True)
 
 
 def abandon() -> None:
