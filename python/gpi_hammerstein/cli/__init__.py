@@ -31,7 +31,8 @@ app: typer.Typer = typer.Typer(
     pretty_exceptions_enable=False,
     help="Identify piezo and other smart-material actuators from measured data.\n\n"
     "To start, run `gpi demo`. Then run `gpi report` with a record of your own.",
-    epilog="Exit codes: 0 success, 2 wrong call, 3 unusable data, 130 interrupted, 1 any other error.",
+    epilog="Exit codes: 0 success, 2 wrong call, 3 unusable data, 130 interrupted, 143 terminated, "
+    "1 any other error.",
 )
 
 
@@ -116,4 +117,6 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 def main() -> None:
     """Run the command `gpi` and exit with its exit code."""
-    sys.exit(run())
+    from gpi_hammerstein_launcher import main as launch
+
+    launch()

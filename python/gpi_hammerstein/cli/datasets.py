@@ -7,6 +7,7 @@ import typer
 from rich.table import Table
 
 from gpi_hammerstein import files
+from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import console, escape, print_json, working
 from gpi_hammerstein.escaping import in_cell
 
@@ -18,7 +19,12 @@ Name = Annotated[
     str, typer.Argument(help="Name of a set; `gpi datasets list` lists them.", show_default=False)
 ]
 Part = Annotated[str | None, typer.Option(help="One of its parts. Default: the first one.")]
-Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the records.")]
+Out = Annotated[
+    Path,
+    typer.Option(
+        "--out", "-o", metavar="DIR", help="Folder for the records.", callback=options.writable_folder
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 

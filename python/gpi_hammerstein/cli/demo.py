@@ -13,7 +13,14 @@ from gpi_hammerstein._native import Explanation
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.explain import before_and_after, write_results
 from gpi_hammerstein.cli.identification import describe_model
-from gpi_hammerstein.cli.output import console, escape, print_json, progress_bar, say_written
+from gpi_hammerstein.cli.output import (
+    console,
+    escape,
+    print_json,
+    progress_bar,
+    say_written,
+    stoppable,
+)
 from gpi_hammerstein.cli.validate import residual_figures
 from gpi_hammerstein.explanation import in_words, join, to_dict
 from gpi_hammerstein.held_out import rule_of
@@ -32,7 +39,7 @@ def demo(out: options.Out = None, as_json: options.Json = False) -> None:
     with as_file(DATA / RECORD) as path:
         record = read_record(path)
     truth = json.loads((DATA / TRUTH).read_text(encoding="utf-8"))
-    with progress_bar() as progress:
+    with progress_bar() as progress, stoppable():
         found = native.explain(record, progress=progress)
     result: dict[str, Any] = {
         "schema": "gpi-demo/1",

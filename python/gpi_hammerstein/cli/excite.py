@@ -27,7 +27,10 @@ Range = Annotated[
 Slew = Annotated[float | None, typer.Option(help="Largest slope, in units per second.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")]
 Unit = Annotated[str, typer.Option(help="Unit of the signal, for the name of the column.")]
-Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE.csv", help="File to write.")]
+Out = Annotated[
+    Path,
+    typer.Option("--out", "-o", metavar="FILE.csv", help="File to write.", callback=options.writable_file),
+]
 
 
 @excite.command()

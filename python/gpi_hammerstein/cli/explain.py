@@ -23,6 +23,7 @@ from gpi_hammerstein.cli.output import (
     progress_bar,
     rival_table,
     say_written,
+    stoppable,
     working,
     write_json,
 )
@@ -156,7 +157,7 @@ def explained(
     if holdout_record is not None and holdout_record.suffix == ".npy":
         raise ParameterError(f"`holdout-record` = {holdout_record}: a .npy file contains no output; use .npz")
     other = None if holdout_record is None else options.read([holdout_record], **read).record()
-    with progress_bar() as progress:
+    with progress_bar() as progress, stoppable():
         found = native.explain(recording.record(), other, progress=progress, **choices)
     where = (
         "blocks of time that are distributed over the record"

@@ -7,15 +7,26 @@ import typer
 
 from gpi_hammerstein import files
 from gpi_hammerstein._native import ParameterError
+from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.compensate import read_pair
 from gpi_hammerstein.cli.output import console, escape
 from gpi_hammerstein.cli.simulate import ModelFile
 from gpi_hammerstein.export import export_c, export_rust
 
 Rust = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Write a Rust module, for example compensator.rs.")
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Write a Rust module, for example compensator.rs.",
+        callback=options.writable_file,
+    ),
 ]
-C = Annotated[Path | None, typer.Option("--c", metavar="DIR", help="Write NAME.h and NAME.c in C99.")]
+C = Annotated[
+    Path | None,
+    typer.Option(
+        "--c", metavar="DIR", help="Write NAME.h and NAME.c in C99.", callback=options.writable_folder
+    ),
+]
 Limits = Annotated[
     str | None, typer.Option(metavar="LOW,HIGH", help="Lowest and highest drive, in the unit of the input.")
 ]

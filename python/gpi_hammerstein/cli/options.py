@@ -6,9 +6,25 @@ from typing import Annotated
 import typer
 
 from gpi_hammerstein._native import ParameterError
+from gpi_hammerstein.files import require_file, require_folder
 from gpi_hammerstein.io import Recording, read_recording
 
 COLUMNS = "Columns"
+
+
+def writable_folder(context: typer.Context, out: Path | None) -> Path | None:
+    """Refuse a folder that cannot be written, before the work begins."""
+    if out is not None and not context.resilient_parsing:
+        require_folder(out)
+    return out
+
+
+def writable_file(context: typer.Context, option: typer.CallbackParam, file: Path | None) -> Path | None:
+    """Refuse a file that cannot be written, before the work begins."""
+    if file is not None and not context.resilient_parsing:
+        require_file(file, str(option.name))
+    return file
+
 
 Records = Annotated[
     list[Path],
@@ -87,7 +103,14 @@ FitStart = Annotated[
 ]
 Out = Annotated[
     Path | None,
-    typer.Option("--out", "-o", metavar="DIR", help="Folder for the output files.", show_default=False),
+    typer.Option(
+        "--out",
+        "-o",
+        metavar="DIR",
+        help="Folder for the output files.",
+        show_default=False,
+        callback=writable_folder,
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
 

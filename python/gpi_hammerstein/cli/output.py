@@ -2,7 +2,9 @@
 
 import json
 import math
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -100,6 +102,22 @@ def progress_bar() -> Iterator[Callable[[str, float], None] | None]:
             bar.update(task, description=phase, completed=done)
 
         yield report
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Let Ctrl-C raise KeyboardInterrupt in the block, for work that then returns what it has found so far."""
+    is_main = threading.current_thread() is threading.main_thread()
+    before = signal.getsignal(signal.SIGINT) if is_main else None
+    # Who ignores Ctrl-C, or handles it in a way of their own that is not Python's, keeps this.
+    if not callable(before):
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def describe_record(recording: Recording, files: Sequence[Path | str]) -> dict[str, Any]:

@@ -5,13 +5,15 @@ from typing import Annotated, Any
 
 import typer
 
-from gpi_hammerstein._native import ParameterError
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.explain import explained, split_effects
 from gpi_hammerstein.cli.output import common_unit, console, escape, working
 from gpi_hammerstein.explanation import in_words, to_dict
 
-Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File for the page.")]
+Out = Annotated[
+    Path,
+    typer.Option("--out", "-o", metavar="FILE", help="File for the page.", callback=options.writable_file),
+]
 
 
 def report(
@@ -51,10 +53,6 @@ def report(
         "resample": resample,
         "warmup": warmup,
     }
-    if not out.parent.is_dir():
-        raise ParameterError(
-            f"`out` = {out}: cannot be written: the folder {out.parent} does not exist; create it first"
-        )
     chosen = split_effects(effects)
     recording, found, _ = explained(records, read, experiments, holdout_record, effects=chosen)
     with working("drawing"):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gpi_hammerstein._native import DataError
 from gpi_hammerstein.escaping import visible
 from gpi_hammerstein.io.columns import Column, parse_header
+from gpi_hammerstein.io.forked import require_threads
 from gpi_hammerstein.io.header import DECIMAL_COMMA, find_header, is_number
 
 Array = NDArray[np.float64]
@@ -117,6 +118,7 @@ def read_csv(path: Path) -> Table:
             f"{path}: no rows below the header line `{header.separator.join(names)[:60]}`; a record has one "
             "row for each sample"
         )
+    require_threads()
     try:
         frame = pl.read_csv(
             io.BytesIO(header.rows.encode()),
@@ -153,6 +155,7 @@ def read_parquet(path: Path) -> Table:
     --------
     >>> read_parquet(Path("record.parquet")).headers()  # doctest: +SKIP
     """
+    require_threads()
     try:
         frame = pl.read_parquet(io.BytesIO(path.read_bytes()))
     except OSError as error:

@@ -10,7 +10,7 @@ from string import Template
 
 from gpi_hammerstein._native import Explanation, __version__
 from gpi_hammerstein.explanation import in_words, to_dict
-from gpi_hammerstein.files import write_atomically
+from gpi_hammerstein.files import require_file, write_atomically
 from gpi_hammerstein.report import tables
 from gpi_hammerstein.report.figures import as_svg, pictures
 from gpi_hammerstein.report.quality import facts
@@ -150,4 +150,5 @@ def write_report(
     --------
     >>> write_report(found, "report.html")  # doctest: +SKIP
     """
+    require_file(path)
     write_atomically(path, report_html(found, command=command, notes=notes))
