@@ -134,7 +134,8 @@ def summary(results: Sequence[Result]) -> Table:
 def clean(results: Sequence[Result]) -> Table:
     """Return the errors of stages that lack nothing on another experiment, over the noise, by their kind.
 
-    The start of the other experiment is fitted, and the offset of the training record is kept.
+    The drive of the other experiment stays in the range of the training record's, as far as one of 30
+    experiments does. Its start is fitted, and the offset of the training record is kept.
     """
     groups: dict[str, list[Result]] = {}
     for result in results:

@@ -3,10 +3,12 @@
 import json
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 import gpi_hammerstein as gpi
 import plants
@@ -141,15 +143,33 @@ def clean(seed: int, seconds: float) -> Result:
     """
     in_motion = textbook.is_in_motion(seed)
     plant = plants.draw(seed, (), seconds=seconds, in_motion=in_motion)
-    record, again = (as_record(plant.record(number)) for number in (0, 1))
+    number = within(lambda number: plant.record(number).u)
+    record, again = (as_record(plant.record(number)) for number in (0, number))
     name = f"clean plant {seed}{', in motion' if in_motion else ''}"
     return explained(name, (), record, again, plant.noise_std)
+
+
+def within(drive: Callable[[int], NDArray[np.float64]], most: int = 30) -> int:
+    """Return the number of the first other experiment whose drive stays in the range of that of experiment 0.
+
+    Nothing can be known of a stage where it was not driven, so that an experiment beyond that range
+    measures luck. If none of ``most`` experiments stays inside, it is the one that leaves the range least.
+    """
+    known = drive(0)
+    beyond = {}
+    for number in range(1, most + 1):
+        other = drive(number)
+        beyond[number] = max(known.min() - other.min(), other.max() - known.max(), 0.0)
+        if beyond[number] == 0.0:
+            break
+    return min(beyond, key=beyond.__getitem__)
 
 
 def of_textbook(stage: str, seed: int) -> Result:
     """Explain one record of a stage of another textbook; the label says what must and what may be named."""
     label = textbook.STAGES[stage]
-    one, two = (textbook.draw(stage, seed, number) for number in (0, 1))
+    number = within(lambda number: textbook.draw(stage, seed, number).u)
+    one, two = (textbook.draw(stage, seed, number) for number in (0, number))
     record, again = (
         gpi.Record(
             run.u, run.y, rate=run.rate, covariates=run.columns, input_units=["V"], output_units=["um"]
