@@ -47,7 +47,7 @@ class Count:
     def __str__(self) -> str:
         """Return the counts as one line."""
         return (
-            f"{self.kills} kills: {self.mixed} mixed folders, {self.lost} folders with lost files of the user, "
+            f"{self.kills} kills: {self.mixed} mixed folders, {self.lost} folders without the user's files, "
             f"{self.left} temporary files or folders after the next run "
             f"({self.temporary_before} kills had left some for it)"
         )

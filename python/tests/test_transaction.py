@@ -39,7 +39,7 @@ def kill_everywhere(situation: str, stride: int) -> int:
 
 @pytest.mark.parametrize("situation", ["single", "new", "exchange", "renames", "current", "link"])
 def test_a_kill_leaves_one_generation(situation: str) -> None:
-    assert kill_everywhere(situation, 23) >= 5
+    assert kill_everywhere(situation, 47) >= 2
 
 
 @pytest.mark.slow
