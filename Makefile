@@ -19,7 +19,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # `make test` always runs its checks in the same order, also with `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam kill-writes clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -104,6 +104,9 @@ scoreboard: $(NATIVE) ## Print how often `explain` names the right effects (take
 
 blind-exam: $(NATIVE) ## Write the answers on the blind records to docs/blind-exam.json (takes a long time)
 	$(BIN)/python tools/blind_exam.py
+
+kill-writes: $(NATIVE) ## Kill runs 200 times while they write, and count damaged folders
+	$(BIN)/python tools/kill_writes.py --kills 200
 
 clean: ## Remove the environment, all builds and all caches
 	cargo clean

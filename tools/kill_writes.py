@@ -1,9 +1,9 @@
 """Kill processes while they write a folder of results, and count the folders that are damaged.
 
-A run writes a folder of several files again and again, each time with a new generation number in every file, and is
-killed by SIGKILL at a random moment. Then the folder must have the files of exactly one generation, and files of the
-user that were in it. After one more run, nothing temporary may be left beside it or in it. Two kinds of runs are
-killed:
+A run writes a folder of several files again and again, each time with a new generation number in every file,
+and is killed by SIGKILL at a random moment. Then the folder must have the files of exactly one generation,
+and files of the user that were in it. After one more run, nothing temporary may be left beside it or in it.
+Two kinds of runs are killed:
 
 - the functions of the package that write, in a process that does nothing else;
 - the command `gpi validate`, which writes pictures and JSON.
@@ -22,6 +22,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from _typeshed import TraceFunction
 
 FILES = 8
 BYTES = 20_000
@@ -42,7 +47,7 @@ class Count:
     def __str__(self) -> str:
         """Return the counts as one line."""
         return (
-            f"{self.kills} kills: {self.mixed} mixed folders, {self.lost} folders with lost files of the user, "
+            f"{self.kills} kills: {self.mixed} mixed folders, {self.lost} folders without the user's files, "
             f"{self.left} temporary files or folders after the next run "
             f"({self.temporary_before} kills had left some for it)"
         )
@@ -54,11 +59,12 @@ def write_generation(out: Path, generation: int) -> None:
 
     with staged(out) as folder:
         for index in range(FILES):
-            (folder / f"file{index}.txt").write_text(f"{generation}\n" * (BYTES // len(f"{generation}\n")))
+            line = f"{generation}\n"
+            (folder / f"file{index}.txt").write_text(line * (BYTES // len(line)))
 
 
 def generations(out: Path) -> set[str]:
-    """Return the generations that the files of a folder have; an incomplete folder has the generation `part`."""
+    """Return the generations of the files in a folder; an incomplete folder has the generation `part`."""
     files = [out / f"file{index}.txt" for index in range(FILES)]
     found = {line for file in files if file.exists() for line in file.read_text().splitlines()}
     complete = all(file.exists() for file in files) or not any(file.exists() for file in files)
@@ -172,7 +178,8 @@ def quiet(arguments: list[str]) -> None:
 
 
 def kill_at_every_line(write: Callable[[], None], check: Callable[[int], None], stride: int = 1) -> int:
-    """Kill `write` before the first, second, .. line of the package's writing functions; check after each kill.
+    """Kill `write` before the first, second, .. line of the package's writing functions; check after each
+    kill.
 
     Every change of the file system is made in a line of these functions or of `shutil`, and both are counted.
 
@@ -197,9 +204,11 @@ def kill_at_every_line(write: Callable[[], None], check: Callable[[int], None], 
         if child == 0:
             seen = 0
 
-            def trace(frame: object, event: str, _: object) -> Callable[..., object] | None:
+            def trace(
+                frame: FrameType, event: str, _: object, number: int = number
+            ) -> "TraceFunction | None":
                 nonlocal seen
-                code = frame.f_code  # type: ignore[attr-defined]
+                code = frame.f_code
                 # The search for processes in the folder has many lines and changes nothing.
                 if code.co_name == "_is_current" or not any(part in code.co_filename for part in watched):
                     return None
@@ -224,9 +233,7 @@ def kill_at_every_line(write: Callable[[], None], check: Callable[[int], None], 
 
 def main() -> int:
     """Print the counts; return 1 if a folder was damaged or something was left."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=200, help="kills of the writing functions")
     parser.add_argument("--commands", type=int, default=20, help="kills of the whole command")
     parser.add_argument("--seed", type=int, default=0)

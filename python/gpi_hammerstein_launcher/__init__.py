@@ -1,12 +1,13 @@
 """The start of the command `gpi`: Ctrl-C and SIGTERM end it at any moment, without a traceback.
 
-This package is imported before all others, and imports nothing that takes time. Its handlers do not raise an exception:
-an exception can be lost in a destructor or a callback, or leave an import half done. They remove what is temporary, say
-so, and end the process. While results take their place, `gpi_hammerstein.files` defers the signals for some milliseconds.
+This package is imported before all others, and imports nothing that takes time. Its handlers do not raise an
+exception: an exception can be lost in a destructor or a callback, or leave an import half done. They remove
+what is temporary, say so, and end the process. While results take their place, `gpi_hammerstein.files` defers
+the signals for some milliseconds.
 """
 
 # The module `signal` imports `enum`, which takes milliseconds without a handler; this is the part in C of it.
-import _signal as signal
+import _signal as signal  # type: ignore[import-not-found]
 import os
 import sys
 

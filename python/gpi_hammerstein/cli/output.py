@@ -106,7 +106,7 @@ def progress_bar() -> Iterator[Callable[[str, float], None] | None]:
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt in the block, for work that then returns what it has found so far."""
+    """Let Ctrl-C raise KeyboardInterrupt in the block, for work that then returns what it has found."""
     is_main = threading.current_thread() is threading.main_thread()
     before = signal.getsignal(signal.SIGINT) if is_main else None
     # Who ignores Ctrl-C, or handles it in a way of their own that is not Python's, keeps this.

@@ -4,7 +4,7 @@ A temporary folder contains:
 
     new/       the files of this run
     whole/     the complete next generation: links to `new` and to the other files of the target
-    journal    what is about to be done
+    journal    what is about to be done; `undo` if it failed and is taken back
     old/       the old generation, or copies of its files
 
 In a swap, `whole` and the target exchange their names in one step of the file system (`renameat2` with
@@ -24,6 +24,7 @@ import os
 import shutil
 import stat
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,8 @@ def replace_folder(container: Path, target: Path, may_swap: bool) -> None:
         _write_journal(container, target, replaced)
         swap(whole, target, container / "old")
     except (OSError, CannotSwapError):
+        if not target.is_dir():
+            raise  # neither could be renamed
         shutil.rmtree(container / "whole", ignore_errors=True)
         _replace_files(container, target, names)
     else:
@@ -143,21 +146,28 @@ def _replace_files(container: Path, target: Path, names: list[str]) -> None:
     for name in names:
         if (target / name).exists() and not (target / name).is_symlink():
             _copy(target / name, old / name)
-    _write_journal(container, target, None)
-    done: list[str] = []
+    fresh = [name for name in names if not (target / name).exists()]
+    _write_journal(container, target, None, fresh)
     try:
         for name in names:
             _replace_file(new / name, target / name)
-            done.append(name)
     except BaseException:
-        (container / "journal").unlink()
-        for name in done:
-            if os.path.lexists(old / name):
-                os.replace(old / name, target / name)
-            elif not (target / name).is_symlink():
-                (target / name).unlink()
+        # If even the way back fails, the next run goes it.
+        (container / KEEP).touch()
+        os.rename(container / "journal", container / "undo")
+        _undo(container, target, fresh)
+        (container / KEEP).unlink()
         raise
     flush_folder(target)
+
+
+def _undo(container: Path, target: Path, fresh: list[str]) -> None:
+    """Put the old files back, and remove the new ones that replaced none."""
+    for file in sorted((container / "old").iterdir()):
+        os.replace(file, target / file.name)
+    for name in fresh:
+        if not (container / "new" / name).exists():
+            (target / name).unlink(missing_ok=True)
 
 
 def _copy(file: Path, copy: Path) -> None:
@@ -181,10 +191,10 @@ def _replace_file(new: Path, place: Path) -> None:
     os.replace(new, place)
 
 
-def _write_journal(container: Path, target: Path, replaces: int | None) -> None:
+def _write_journal(container: Path, target: Path, replaces: int | None, fresh: Sequence[str] = ()) -> None:
     """Note what is about to be done: a swap of the folder with this inode, or renames of files (None)."""
     # A relative path stays right if somebody renames the folder above.
-    content = {"target": os.path.relpath(target, container), "replaces": replaces}
+    content = {"target": os.path.relpath(target, container), "replaces": replaces, "fresh": list(fresh)}
     (container / "journal.part").write_text(json.dumps(content))
     flush_file(container / "journal.part")
     os.rename(container / "journal.part", container / "journal")
@@ -194,13 +204,17 @@ def _write_journal(container: Path, target: Path, replaces: int | None) -> None:
 def recover(container: Path) -> None:
     """Complete or undo what a killed process had begun in its temporary folder, which can then be removed."""
     try:
-        journal: dict[str, Any] = json.loads((container / "journal").read_text())
+        undone = (container / "undo").exists()
+        journal: dict[str, Any] = json.loads((container / ("undo" if undone else "journal")).read_text())
     except (FileNotFoundError, ValueError):
         return  # nothing had begun
     target = Path(os.path.normpath(container / journal["target"]))
     if journal["replaces"] is None:
         if not target.exists():
             return  # somebody has removed it since
+        if undone:
+            _undo(container, target, journal["fresh"])
+            return
         for file in sorted((container / "new").iterdir()):
             _replace_file(file, target / file.name)
         return

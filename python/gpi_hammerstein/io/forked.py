@@ -1,7 +1,7 @@
 """Detection of a forked process in which Polars would wait for ever.
 
-Polars works on threads that exist only in the process that has started them. After `fork`, the child has the pool but
-not its threads, and waits for them.
+Polars works on threads that exist only in the process that has started them. After `fork`, the child has the
+pool but not its threads, and waits for them.
 """
 
 import os
@@ -21,8 +21,8 @@ def require_threads() -> None:
     """
     if _state["broken"]:
         raise ParameterError(
-            "`start_method` = fork: this process was forked after its parent had read a record, and has no threads "
-            'for Polars; use multiprocessing.get_context("spawn"), or read the record in the parent'
+            "`start_method` = fork: this process was forked after its parent had read a record, and has no "
+            'threads for Polars; use multiprocessing.get_context("spawn"), or read the record in the parent'
         )
     _state["used"] = True
 
