@@ -19,7 +19,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # `make test` always runs its checks in the same order, also with `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam fuzz-readers clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -104,6 +104,9 @@ scoreboard: $(NATIVE) ## Print how often `explain` names the right effects (take
 
 blind-exam: $(NATIVE) ## Write the answers on the blind records to docs/blind-exam.json (takes a long time)
 	$(BIN)/python tools/blind_exam.py
+
+fuzz-readers: $(NATIVE) ## Read 100,000 mutated record files of a new seed and count the results by class
+	$(BIN)/python tools/fuzz_readers.py --number 100000
 
 clean: ## Remove the environment, all builds and all caches
 	cargo clean

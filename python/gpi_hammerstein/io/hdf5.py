@@ -26,7 +26,8 @@ def read_hdf5(file: File) -> dict[str, Any]:
     -------
     dict
         Arrays by their names; a :class:`~gpi_hammerstein.io.arrays.LeftOut` for each variable that is no
-        array of real numbers. MATLAB's arrays are stored in column-major order, so that the axes are reversed.
+        array of real numbers. MATLAB stores arrays column by column, so that the axes are
+        reversed.
 
     Raises
     ------

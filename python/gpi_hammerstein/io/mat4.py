@@ -1,8 +1,8 @@
 """Reading of MAT files of version 4 (``save -v4``).
 
 A variable is a header of five integers (type, rows, columns, imaginary, length of the name), the name, which
-ends with a zero byte, and the numbers, column by column. The decimal digits of the type are M O P T: the order
-of the bytes (0 little, 1 big), 0, the type of the numbers, and the kind of the matrix (0 full, 1 text,
+ends with a zero byte, and the numbers, column by column. The decimal digits of the type are M O P T: the
+order of the bytes (0 little, 1 big), 0, the type of the numbers, and the kind of the matrix (0 full, 1 text,
 2 sparse).
 """
 

@@ -36,6 +36,7 @@ TEXTS = (INT8, 2, 16)
 # Classes of variables: 6 is double, 7 single, 8 to 15 integers; logical variables are of class uint8.
 NUMERIC = range(6, 16)
 OTHERS = {1: "a cell array", 2: "a structure", 3: "an object", 4: "text", 5: "a sparse matrix"}
+OTHERS |= {16: "a function", 17: "an object"}
 COMPLEX = 0x0800
 
 
@@ -120,8 +121,10 @@ def _variable(content: memoryview, order: str) -> tuple[str, Any]:
         raise ValueError("a variable has no flags")
     (flags,) = struct.unpack_from(f"{order}I", flags_data)
     variable_class = flags & 0xFF
+    if variable_class in OTHERS:
+        return _name(content, order), LeftOut(OTHERS[variable_class])
     if variable_class not in NUMERIC:
-        return _name(content, order), LeftOut(OTHERS.get(variable_class, "an object"))
+        raise ValueError(f"a variable is of the unknown class {variable_class}")
     parts = [*islice(elements, 5)]
     if len(parts) not in (3, 4):
         raise ValueError("a variable does not consist of its dimensions, its name and its numbers")
