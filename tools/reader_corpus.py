@@ -97,13 +97,23 @@ def mat_files() -> Iterator[Seed]:
         return b"MATLAB 5.0 MAT-file".ljust(116) + stream.getvalue()[116:]
 
     def compressed(content: bytes) -> bytes:
-        """Compress the bytes behind the header as one element."""
-        data = zlib.compress(content[128:])
-        return content[:128] + struct.pack("<II", 15, len(data)) + data
+        """Compress each variable of a file as one element, as MATLAB does."""
+        place, result = 128, content[:128]
+        while place + 8 <= len(content):
+            size = 8 + min(int.from_bytes(content[place + 4 : place + 8], "little"), len(content))
+            data = zlib.compress(content[place : place + size])
+            result += struct.pack("<II", 15, len(data)) + data
+            place += size
+        return result
 
     yield Seed("MAT 5", ".mat", mat5(arrays))
     yield Seed("MAT 5", ".mat", mat5(arrays | more))
-    yield Seed("MAT 5", ".mat", mat5({"u": np.column_stack([*signals().values()])}), compressed)
+    yield Seed(
+        "MAT 5",
+        ".mat",
+        mat5({"y": np.outer(signals()["y_um"], [1, 2]), "u": signals()["u_V"], "fs": 100.0}),
+        compressed,
+    )
     four = io.BytesIO()
     scipy.io.savemat(four, arrays, format="4")
     yield Seed("MAT 4", ".mat", four.getvalue())
@@ -123,7 +133,7 @@ def parquet_files() -> Iterator[Seed]:
 
     frame = pl.DataFrame(signals())
     text = frame.with_columns(pl.col("u_V").cast(pl.String))
-    repeated = frame.with_columns(pl.Series("y_um", [1.0, 2.0, None] * (SAMPLES // 3)))
+    repeated = frame.with_columns(pl.Series("y_um", [1.0, 2.0, 3.0] * (SAMPLES // 3)))
     for data, compression in ((frame, "uncompressed"), (text, "snappy"), (repeated, "zstd")):
         stream = io.BytesIO()
         data.write_parquet(stream, compression=compression)
