@@ -4,8 +4,8 @@
 
 Every file must be read, or be refused with an error of the package that names it. The files are read in
 worker processes, so that a process that dies (signal) or does not answer (hang) is counted, and the run goes
-on. The files that fail are written to the folder of `--keep`, and the exit code is 1. The file `index` of the run
-`seed` is always the same: `reader_corpus.mutation(corpus(), seed, index)`.
+on. The files that fail are written to the folder of `--keep`, and the exit code is 1. The file `index` of the
+run `seed` is always the same: `reader_corpus.mutation(corpus(), seed, index)`.
 """
 
 import argparse

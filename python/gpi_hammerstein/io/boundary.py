@@ -90,6 +90,8 @@ def _content(path: Path) -> tuple[bytes, Allowance]:
             allowance = Allowance(path, status.st_size)
             allowance.spend(status.st_size)
             data = file.read(status.st_size)
+    except GpiError:  # which is also a ValueError
+        raise
     except FileNotFoundError:
         raise DataError(f"{path}: no such file; give a record file") from None
     except OSError as error:

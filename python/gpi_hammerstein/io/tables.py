@@ -96,27 +96,41 @@ def from_frame(frame: pl.DataFrame, source: str) -> Table:
         )
     columns: dict[Column, Array] = {}
     text: dict[Column, str] = {}
-    for series in frame:
-        column = parse_header(series.name)
-        if series.dtype == pl.String:
-            cells = series.str.strip_chars()
-            cells = cells.set(cells == "", None)
-            # a comma within a cell is a decimal comma, because the separator is then another character
-            if cells.str.contains(DECIMAL_COMMA).fill_null(True).all():
-                cells = cells.str.replace(",", ".", literal=True)
-            numbers = cells.cast(pl.Float64, strict=False)
-            wrong = (numbers.is_null() & cells.is_not_null()).arg_true()
-            if len(wrong):
-                row = int(wrong[0])
-                text[column] = f"text, first `{shortened(cells[row])}` in row {row}"
-                continue
-        elif series.dtype.is_numeric() or series.dtype == pl.Boolean:
-            numbers = series.cast(pl.Float64)
+    frame, wrong = _numbers_of_texts(frame)
+    numeric = [name for name, kind in frame.schema.items() if kind.is_numeric() or kind == pl.Boolean]
+    # All columns at once, because a call for each of many columns is slow.
+    numbers = frame.select(pl.col(numeric).cast(pl.Float64).fill_null(float("nan")))
+    there = dict(zip(numbers.columns, numbers.get_columns(), strict=True))
+    for name, kind in frame.schema.items():
+        column = parse_header(name)
+        if name in there:
+            columns[column] = there[name].to_numpy().astype(np.float64)
         else:
-            text[column] = f"values of the type {series.dtype}"
-            continue
-        columns[column] = numbers.fill_null(float("nan")).to_numpy().astype(np.float64)
+            text[column] = wrong.get(name, f"values of the type {kind}")
     return Table(source, columns, text)
+
+
+def _numbers_of_texts(frame: pl.DataFrame) -> tuple[pl.DataFrame, dict[str, str]]:
+    """Convert the columns of text that contain only numbers.
+
+    Returns the frame, and the first text of each column that could not be converted.
+    """
+    cells = frame.select(pl.col(pl.String).str.strip_chars())
+    cells = cells.select(pl.when(pl.all() != "").then(pl.all()))
+    if not cells.width:
+        return frame, {}
+    # A comma within a cell is a decimal comma, because the separator is then another character.
+    commas = cells.select(pl.all().str.contains(DECIMAL_COMMA).fill_null(True).all()).row(0)
+    replaced = [name for name, found in zip(cells.columns, commas, strict=True) if found]
+    numbers = cells.with_columns(pl.col(replaced).str.replace(",", ".", literal=True))
+    numbers = numbers.select(pl.all().cast(pl.Float64, strict=False))
+    before, after = cells.null_count().row(0), numbers.null_count().row(0)
+    wrong = {}
+    for name, empty, lost in zip(cells.columns, before, after, strict=True):
+        if lost > empty:
+            row = int((numbers[name].is_null() & cells[name].is_not_null()).arg_true()[0])
+            wrong[name] = f"text, first `{shortened(cells[name][row])}` in row {row}"
+    return frame.with_columns(numbers.drop(list(wrong))), wrong
 
 
 def shortened(text: str) -> str:
