@@ -165,7 +165,7 @@ def test_a_small_file_cannot_take_much_memory(
     assert len(content) < 1 << 20
     path = tmp_path / name
     path.write_bytes(content)
-    refused(path, "250 times as large as the file", "GPI_MAX_READ_RATIO", rate=1.0)
+    refused(path, "100 times as large as the file", "GPI_MAX_READ_RATIO", rate=1.0)
     monkeypatch.setenv("GPI_MAX_READ_RATIO", "100000000")
     monkeypatch.setenv("GPI_MAX_READ_BYTES", str(18 << 20))
     refused(path, f"more than {18 << 20} bytes", "GPI_MAX_READ_BYTES", rate=1.0)

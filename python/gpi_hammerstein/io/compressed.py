@@ -53,6 +53,7 @@ def inflate(data: bytes, allowance: Allowance, window: int) -> bytes:
             part = machine.decompress(piece, CHUNK)
             place += len(piece) - len(machine.unconsumed_tail) - len(machine.unused_data)
             allowance.spend(len(part))
+            allowance.check_ratio(len(result) + len(part), place)
             result += part
             if not part and machine.unconsumed_tail:
                 raise EOFError("the compressed data is corrupt")

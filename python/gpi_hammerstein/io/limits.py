@@ -9,7 +9,7 @@ and for programs that use the package:
 variable                  default     meaning
 ========================  ==========  ==================================================================
 ``GPI_MAX_READ_BYTES``    1073741824  largest size of the data of one file in bytes, after decompression
-``GPI_MAX_READ_RATIO``    250         largest ratio of the decompressed size to the size of the file
+``GPI_MAX_READ_RATIO``    100         largest ratio of the decompressed size to the size of the file
 ``GPI_MAX_READ_COLUMNS``  1000        largest number of columns or variables of one file
 ========================  ==========  ==================================================================
 """
@@ -26,7 +26,7 @@ DEFAULTS = {
     # 40 million samples of three columns of float64, which is more than an identification can use.
     BYTES: 1 << 30,
     # Records of real sensors are compressed by less than 20; zeros are compressed by gzip by 1032.
-    RATIO: 250,
+    RATIO: 100,
     # Far above the channels of a stage; identification needs memory that grows with their square.
     COLUMNS: 1000,
 }
@@ -92,15 +92,20 @@ class Allowance:
         """
         if size > self.left():
             if self.used + size > self.largest:
-                reason, variable = f"more than {self.largest} bytes of data", BYTES
-            else:
-                reason = f"data that is more than {self.ratio} times as large as the file"
-                variable = RATIO
-            raise DataError(
-                f"{self.path}: contains {reason}; if you trust the file, raise the limit with the "
-                f"environment variable {variable}"
-            )
+                raise self._exceeded(f"more than {self.largest} bytes of data", BYTES)
+            raise self._ratio_exceeded()
         self.used += size
+
+    def check_ratio(self, produced: int, consumed: int) -> None:
+        """Check how much `consumed` compressed bytes have become, so that a bomb is found at its start.
+
+        Raises
+        ------
+        DataError
+            The data is much larger than its compressed form.
+        """
+        if produced > max(HARMLESS, self.ratio * consumed):
+            raise self._ratio_exceeded()
 
     def check_columns(self, count: int) -> None:
         """Check a number of columns or variables.
@@ -115,3 +120,12 @@ class Allowance:
                 f"{self.path}: has {count} columns, more than {self.columns}; remove the columns that are no "
                 f"part of the record, or raise the limit with the environment variable {COLUMNS}"
             )
+
+    def _ratio_exceeded(self) -> DataError:
+        return self._exceeded(f"data that is more than {self.ratio} times as large as the file", RATIO)
+
+    def _exceeded(self, what: str, variable: str) -> DataError:
+        return DataError(
+            f"{self.path}: contains {what}; if you trust the file, raise the limit with the environment "
+            f"variable {variable}"
+        )

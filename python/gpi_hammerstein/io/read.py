@@ -44,8 +44,8 @@ def read_record(
     path
         A file, or a list of files with the same columns, whose experiments are put in one record. Formats are
         CSV (``.csv``, ``.csv.gz``, also separated by semicolons or tabs), Parquet (``.parquet``), NumPy
-        (``.npz``, ``.npy``) and MATLAB v4, v5 or v7.3 (``.mat``). Arrays in NumPy and MATLAB files have the shape
-        (samples,), (samples, channels), (samples, channels, realisations) or (samples, channels,
+        (``.npz``, ``.npy``) and MATLAB v4, v5 or v7.3 (``.mat``). Arrays in NumPy and MATLAB files have
+        the shape (samples,), (samples, channels), (samples, channels, realisations) or (samples, channels,
         realisations, periods). Every realisation is an experiment; all of its periods except the last one are
         warm-up. A Polars or pandas data frame or an xarray dataset, with columns named as in a CSV file, is
         also accepted.
@@ -82,15 +82,15 @@ def read_record(
         An option contradicts the file or is out of range.
     DataError
         The file is missing, is not a regular file, is corrupt, is empty, or contains text, NaN or infinite
-        samples; columns are missing or have different lengths; time stamps have gaps, run backwards or are not
-        uniform. The message states the column and the rows, which are counted from 0. The file contains more
-        than a limit allows.
+        samples; columns are missing or have different lengths; time stamps have gaps, run backwards or are
+        not uniform. The message states the column and the rows, which are counted from 0. The file contains
+        more than a limit allows.
 
     Notes
     -----
     Three limits protect against files that exhaust memory. They are environment variables:
     ``GPI_MAX_READ_BYTES`` (1073741824), the size of the data of one file after decompression;
-    ``GPI_MAX_READ_RATIO`` (250), the ratio of this size to the size of the file, if the data has more than
+    ``GPI_MAX_READ_RATIO`` (100), the ratio of this size to the size of the file, if the data has more than
     16 MiB; ``GPI_MAX_READ_COLUMNS`` (1000), the number of columns or variables of one file. An HDF5 file that
     refers to other files is refused.
 
