@@ -25,7 +25,7 @@ import scipy.io
 import gpi_hammerstein as gpi
 from data_folder import DATA
 from fuzz_readers import GOOD, attack, read
-from gpi_hammerstein.io import read_recording
+from gpi_hammerstein.io import apart, read_recording
 from gpi_hammerstein.io.boundary import opened
 from reader_corpus import corpus
 from records import write_csv
@@ -327,6 +327,76 @@ def test_corrupt_compressed_data_is_refused(tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_BZIP2) as archive:
         archive.writestr("u.npy", b"0" * 1000)
     refused(path, "a method that NumPy does not use", rate=1.0)
+
+
+def write_parquet(path: Path) -> Path:
+    pl.DataFrame({"t_s": np.arange(5) * 0.1, "u_V": U, "y_um": Y}).write_parquet(path)
+    return path
+
+
+def test_a_library_that_ends_its_process_or_blocks_does_not_end_this_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_parquet(tmp_path / "r.parquet")
+    reader = apart.Reader()
+    monkeypatch.setattr(apart, "_READER", reader)
+    for program, words in (
+        ("import os; input(); os.abort()", "the process that reads it ended with code -6"),
+        ("print('{\"tables\":', flush=True)", "JSONDecodeError"),
+        ("import time; time.sleep(60)", "GPI_MAX_READ_SECONDS"),
+    ):
+        monkeypatch.setattr(apart, "SERVER", ("-c", program))
+        monkeypatch.setenv("GPI_MAX_READ_SECONDS", "1" if "sleep" in program else "100")
+        with pytest.raises(gpi.DataError, match=r"r\.parquet: cannot be read as Parquet") as caught:
+            read_recording(path)
+        assert words in f"{caught.value} {type(caught.value.__cause__).__name__}"
+        assert reader.process is None
+    monkeypatch.undo()
+    monkeypatch.setattr(apart, "_READER", reader)
+
+    def interrupt(stream: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(apart, "receive", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        read_recording(path)
+    monkeypatch.undo()
+    monkeypatch.setattr(apart, "_READER", reader)
+    # The answer to the request that was interrupted is not taken for the next one.
+    other = tmp_path / "other.parquet"
+    pl.DataFrame({"t_s": np.arange(5) * 0.1, "u_V": 2 * U, "y_um": Y}).write_parquet(other)
+    np.testing.assert_array_equal(gpi.read_record(other).u[0][:, 0], 2 * U)
+    first = reader.process
+    np.testing.assert_array_equal(gpi.read_record(path).u[0][:, 0], U)
+    assert reader.process is first  # one process reads all files
+    reader.close()
+
+
+def test_the_other_process_knows_folder_and_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_parquet(tmp_path / "r.parquet")
+    monkeypatch.chdir(tmp_path)
+    assert len(read_recording("r.parquet").runs[0].u) == 5
+    monkeypatch.setenv("GPI_MAX_READ_COLUMNS", "2")
+    with pytest.raises(gpi.DataError, match=r"^r\.parquet: has 3 columns, more than 2"):
+        read_recording("r.parquet")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
+def test_records_are_read_after_a_fork(tmp_path: Path) -> None:
+    path = write_parquet(tmp_path / "r.parquet")
+    program = (
+        "import os, sys\n"
+        "import gpi_hammerstein as gpi\n"
+        "gpi.read_record(sys.argv[1])\n"
+        "child = os.fork()\n"
+        "gpi.read_record(sys.argv[1])\n"
+        "code = 0 if child == 0 else os.waitpid(child, 0)[1]\n"
+        "gpi.read_record(sys.argv[1])\n"
+        "sys.exit(code)\n"
+    )
+    words = [sys.executable, "-W", "error", "-c", program, str(path)]
+    found = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert (found.returncode, found.stderr) == (0, "")
 
 
 class PanicException(BaseException):  # noqa: N818 (the name of the exception of Rust bindings)

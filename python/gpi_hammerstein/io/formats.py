@@ -2,30 +2,46 @@
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from gpi_hammerstein._native import DataError, ParameterError
+from gpi_hammerstein.io.apart import is_possible, read_apart
 from gpi_hammerstein.io.boundary import File, opened
-from gpi_hammerstein.io.mat import read_mat
+from gpi_hammerstein.io.mat import is_hdf5, read_mat
 from gpi_hammerstein.io.npy import read_npz
 from gpi_hammerstein.io.tables import Table
 from gpi_hammerstein.io.text import read_csv, read_parquet
 
-FORMATS: dict[str, tuple[str, Callable[[File], list[Table]]]] = {
-    ".parquet": ("Parquet", read_parquet),
-    ".npz": ("NPZ", read_npz),
-    ".mat": ("MAT", read_mat),
-    **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".gz"), ("CSV", read_csv)),
+
+@dataclass(frozen=True)
+class Format:
+    """A format of record files."""
+
+    name: str
+    read: Callable[[File], list[Table]]
+    risky: Callable[[bytes], bool] = lambda data: False
+    """Whether the library for this content can end the process; see :mod:`gpi_hammerstein.io.apart`."""
+
+
+CSV = Format("CSV", read_csv)
+FORMATS = {
+    ".parquet": Format("Parquet", read_parquet, lambda data: True),
+    ".npz": Format("NPZ", read_npz),
+    ".mat": Format("MAT", read_mat, is_hdf5),
+    **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".gz"), CSV),
 }
 
 
-def read_tables(path: Path) -> list[Table]:
+def read_tables(path: Path, *, apart: bool = True) -> list[Table]:
     """Read a file of any format except NPY.
 
     Parameters
     ----------
     path
         The file.
+    apart
+        Whether files of risky formats are read in another process.
 
     Returns
     -------
@@ -43,9 +59,11 @@ def read_tables(path: Path) -> list[Table]:
     """
     suffix = path.suffix.lower()
     if suffix in FORMATS:
-        kind, reader = FORMATS[suffix]
-        with opened(path, kind) as file:
-            return reader(file)
+        chosen = FORMATS[suffix]
+        with opened(path, chosen.name) as file:
+            if apart and chosen.risky(file.data) and is_possible():
+                return read_apart(path)
+            return chosen.read(file)
     if not os.path.exists(path):
         raise DataError(f"{path}: no such file; give a record file")
     raise DataError(

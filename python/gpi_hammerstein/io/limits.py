@@ -11,6 +11,7 @@ variable                  default     meaning
 ``GPI_MAX_READ_BYTES``    1073741824  largest size of the data of one file in bytes, after decompression
 ``GPI_MAX_READ_RATIO``    100         largest ratio of the decompressed size to the size of the file
 ``GPI_MAX_READ_COLUMNS``  1000        largest number of columns or variables of one file
+``GPI_MAX_READ_SECONDS``  120         longest time in s for a file that another process reads
 ========================  ==========  ==================================================================
 """
 
@@ -21,6 +22,8 @@ from pathlib import Path
 from gpi_hammerstein._native import DataError, ParameterError
 
 BYTES, RATIO, COLUMNS = "GPI_MAX_READ_BYTES", "GPI_MAX_READ_RATIO", "GPI_MAX_READ_COLUMNS"
+SECONDS = "GPI_MAX_READ_SECONDS"
+VARIABLES = (BYTES, RATIO, COLUMNS, SECONDS)
 
 DEFAULTS = {
     # 40 million samples of three columns of float64, which is more than an identification can use.
@@ -29,6 +32,8 @@ DEFAULTS = {
     RATIO: 100,
     # Far above the channels of a stage; identification needs memory that grows with their square.
     COLUMNS: 1000,
+    # A file of the largest size takes some seconds.
+    SECONDS: 120,
 }
 # Data up to this size cannot exhaust memory: a short record may be compressed by any ratio.
 HARMLESS = 16 << 20

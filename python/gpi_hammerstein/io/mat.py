@@ -36,10 +36,26 @@ def read_mat(file: File) -> list[Table]:
     >>> with opened(Path("record.mat"), "MAT") as file:  # doctest: +SKIP
     ...     read_mat(file)
     """
-    if any(file.data.startswith(HDF5, place) for place in PLACES):
+    if is_hdf5(file.data):
         variables = read_hdf5(file)
     elif is_mat4(file.data):
         variables = read_mat4(file)
     else:
         variables = read_mat5(file)
     return from_arrays(variables, file)
+
+
+def is_hdf5(data: bytes) -> bool:
+    """Return whether the content of a file is that of an HDF5 file, as of MAT 7.3.
+
+    Parameters
+    ----------
+    data
+        The content.
+
+    Examples
+    --------
+    >>> is_hdf5(b"MATLAB 5.0 MAT-file")
+    False
+    """
+    return any(data.startswith(HDF5, place) for place in PLACES)

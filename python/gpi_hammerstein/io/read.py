@@ -88,11 +88,13 @@ def read_record(
 
     Notes
     -----
-    Three limits protect against files that exhaust memory. They are environment variables:
+    Four limits protect against files that exhaust memory or time. They are environment variables:
     ``GPI_MAX_READ_BYTES`` (1073741824), the size of the data of one file after decompression;
     ``GPI_MAX_READ_RATIO`` (100), the ratio of this size to the size of the file, if the data has more than
-    16 MiB; ``GPI_MAX_READ_COLUMNS`` (1000), the number of columns or variables of one file. An HDF5 file that
-    refers to other files is refused.
+    16 MiB; ``GPI_MAX_READ_COLUMNS`` (1000), the number of columns or variables of one file;
+    ``GPI_MAX_READ_SECONDS`` (120), the time for a Parquet or HDF5 file. These two formats are read in another
+    process, because their libraries can end a process if a file is corrupt. An HDF5 file that refers to other
+    files is refused.
 
     Examples
     --------
