@@ -32,7 +32,7 @@ class Reader:
     """The other process, which is started when it is needed."""
 
     def __init__(self) -> None:
-        self.lock = threading.Lock()
+        self.lock: threading.Lock = threading.Lock()
         self.process: subprocess.Popen[bytes] | None = None
 
     def read(self, path: Path) -> list[Table]:
