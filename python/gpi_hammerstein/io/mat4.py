@@ -51,7 +51,7 @@ def read_mat4(file: File) -> dict[str, Any]:
 
     Raises
     ------
-    ValueError, EOFError, struct.error
+    ValueError, EOFError
         The file is corrupt.
 
     Examples
@@ -63,6 +63,8 @@ def read_mat4(file: File) -> dict[str, Any]:
     variables: dict[str, Any] = {}
     data, place = memoryview(file.data), 0
     while place < len(data):
+        if place + HEADER > len(data):
+            raise EOFError("the file ends within the header of a variable")
         order = _order(data, place)
         if order is None:
             raise ValueError(f"there is no variable at byte {place}")

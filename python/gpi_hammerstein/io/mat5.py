@@ -58,7 +58,7 @@ def read_mat5(file: File) -> dict[str, Any]:
     ------
     DataError
         The decompressed data is larger than allowed.
-    ValueError, EOFError, zlib.error, struct.error
+    ValueError, EOFError, zlib.error
         The file is corrupt.
 
     Examples
@@ -96,6 +96,8 @@ def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
     """Yield the type and the data of each element."""
     place = 0
     while place < len(data):
+        if place + 8 > len(data):
+            raise EOFError("the file ends within the tag of an element")
         kind, size = struct.unpack_from(f"{order}II", data, place)
         begin = place + 8
         if kind >> 16:  # the short form: the size is in the upper half
