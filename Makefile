@@ -19,7 +19,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # `make test` always runs its checks in the same order, also with `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam kill-writes clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam kill-writes fuzz-readers fuzz-models clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -107,6 +107,12 @@ blind-exam: $(NATIVE) ## Write the answers on the blind records to docs/blind-ex
 
 kill-writes: $(NATIVE) ## Kill runs 200 times while they write, and count damaged folders
 	$(BIN)/python tools/kill_writes.py --kills 200
+
+fuzz-models: ## Read and use 1,000,000 mutated model files of a new seed and count the results by class
+	GPI_HOSTILE_MODELS=1000000 GPI_HOSTILE_SEED=$$(date +%s) cargo test --release -p gpi-core --test hostile_models -- --nocapture
+
+fuzz-readers: $(NATIVE) ## Read 100,000 mutated record files of a new seed and count the results by class
+	$(BIN)/python tools/fuzz_readers.py --number 100000
 
 clean: ## Remove the environment, all builds and all caches
 	cargo clean

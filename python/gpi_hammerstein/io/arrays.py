@@ -1,13 +1,13 @@
-"""Reading of NumPy and MATLAB files."""
+"""Columns from named arrays, which NumPy and MATLAB files contain."""
 
-import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gpi_hammerstein._native import DataError
+from gpi_hammerstein.io.boundary import File
 from gpi_hammerstein.io.columns import Column, parse_header
 from gpi_hammerstein.io.tables import Array, Table
 
@@ -15,127 +15,19 @@ RATES = ("rate", "fs", "fs_hz", "rate_hz", "sampling_rate")
 PERIODS = ("ts", "dt", "ts_s", "dt_s")
 
 
-def read_npz(path: Path) -> list[Table]:
-    """Read an NPZ archive.
+@dataclass(frozen=True)
+class LeftOut:
+    """An array or variable that contains no real numbers."""
 
-    Parameters
-    ----------
-    path
-        The archive, with arrays such as ``u``, ``y``, ``t``, ``rate``; see :func:`from_arrays` for their
-        shapes.
-
-    Returns
-    -------
-    list of Table
-        One table for each experiment.
-
-    Raises
-    ------
-    DataError
-        The file is not an NPZ archive, has no arrays of numbers, or has arrays of different lengths.
-
-    Examples
-    --------
-    >>> read_npz(Path("record.npz"))  # doctest: +SKIP
-    """
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, EOFError) as error:
-        raise DataError(f"{path}: cannot be read as NPZ: {_reason(error)}") from error
-    return from_arrays(arrays, str(path))
+    what: str
+    """What it contains instead."""
 
 
-def read_npy_pair(input_path: Path, output_path: Path | None) -> list[Table]:
-    """Read the input from one NPY file and the output from another.
-
-    Parameters
-    ----------
-    input_path
-        File of the array u; see :func:`from_arrays` for its shape.
-    output_path
-        File of the array y, which has the same length as u; None for a record without output.
-
-    Returns
-    -------
-    list of Table
-        One table for each experiment, with columns u and y, or u1, u2, .. and y1, y2, ...
-
-    Raises
-    ------
-    DataError
-        A file is missing or is not an array, or the arrays have different lengths.
-
-    Examples
-    --------
-    >>> read_npy_pair(Path("u.npy"), Path("y.npy"))  # doctest: +SKIP
-    """
-    arrays = {}
-    for name, path in (("u", input_path), ("y", output_path)):
-        if path is None:
-            continue
-        try:
-            arrays[name] = np.load(path, allow_pickle=False)
-        except (OSError, ValueError, EOFError) as error:
-            raise DataError(f"{path}: cannot be read as NPY: {_reason(error)}") from error
-    return from_arrays(arrays, str(input_path))
+# Kinds of NumPy types that are no real numbers.
+OTHER_KINDS = {"c": "complex numbers", "M": "dates", "m": "time spans", "V": "structures", "O": "objects"}
 
 
-def read_mat(path: Path) -> list[Table]:
-    """Read a MAT file, v5 or v7.3.
-
-    Parameters
-    ----------
-    path
-        The file, with variables such as ``u``, ``y``, ``t``, ``fs``; see :func:`from_arrays` for their
-        shapes.
-
-    Returns
-    -------
-    list of Table
-        One table for each experiment.
-
-    Raises
-    ------
-    DataError
-        The file is not a MAT file, has no arrays of numbers, or has arrays of different lengths.
-
-    Examples
-    --------
-    >>> read_mat(Path("record.mat"))  # doctest: +SKIP
-    """
-    try:
-        with path.open("rb") as file:
-            hdf5 = b"MATLAB 7.3" in file.read(128)
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
-    try:
-        arrays = _read_hdf5(path) if hdf5 else _read_mat5(path)
-    except (OSError, ValueError, NotImplementedError, TypeError) as error:
-        raise DataError(f"{path}: cannot be read as MAT: {_reason(error)}") from error
-    return from_arrays(arrays, str(path))
-
-
-def _read_mat5(path: Path) -> dict[str, Any]:
-    import scipy.io
-
-    contents = scipy.io.loadmat(os.fspath(path))
-    return {name: value for name, value in contents.items() if not name.startswith("__")}
-
-
-def _read_hdf5(path: Path) -> dict[str, Any]:
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        # MATLAB stores arrays in column-major order.
-        return {
-            name: np.asarray(item).T
-            for name, item in file.items()
-            if isinstance(item, h5py.Dataset) and item.attrs.get("MATLAB_class", b"") != b"char"
-        }
-
-
-def from_arrays(arrays: Mapping[str, Any], source: str) -> list[Table]:
+def from_arrays(arrays: Mapping[str, Any], file: File) -> list[Table]:
     """Divide named arrays into columns.
 
     Parameters
@@ -143,10 +35,10 @@ def from_arrays(arrays: Mapping[str, Any], source: str) -> list[Table]:
     arrays
         Names and arrays of the shapes (samples,), (samples, channels), (samples, channels,
         realisations) or (samples, channels, realisations, periods). A scalar ``rate`` or ``fs`` is the
-        sampling rate in Hz; a scalar ``dt`` or ``Ts`` is the sampling period in s. Arrays that do not contain
-        numbers are text columns.
-    source
-        Name of the file, for messages.
+        sampling rate in Hz; a scalar ``dt`` or ``Ts`` is the sampling period in s. Arrays of text are text
+        columns. Other arrays without real numbers are left out, and a note says so.
+    file
+        The file that contains the arrays.
 
     Returns
     -------
@@ -158,41 +50,63 @@ def from_arrays(arrays: Mapping[str, Any], source: str) -> list[Table]:
     ------
     DataError
         There is no array of samples, the arrays have different lengths, or an array has more channels than
-        samples.
+        samples. There are more columns than the limit.
 
     Examples
     --------
-    >>> [table] = from_arrays({"u": np.zeros((5, 2)), "rate": 100.0}, "demo")
+    >>> from pathlib import Path
+    >>> from gpi_hammerstein.io.limits import Allowance
+    >>> file = File(Path("demo"), b"", Allowance(Path("demo"), 0))
+    >>> [table] = from_arrays({"u": np.zeros((5, 2)), "rate": 100.0}, file)
     >>> [column.name for column in table.headers()], table.rate
     (['u1', 'u2'], 100.0)
     """
+    source = str(file.path)
     rate: float | None = None
     signals: dict[str, Array] = {}
-    text: dict[Column, tuple[int, str]] = {}
+    text: dict[Column, str] = {}
+    left_out: dict[str, str] = {}
     for name, value in arrays.items():
+        if isinstance(value, LeftOut):
+            left_out[name] = value.what
+            continue
         array = np.asarray(value)
         if array.dtype.kind not in "fiub":
-            if array.dtype.kind in "US" and array.size > 1:
-                text[parse_header(name)] = (0, str(array.flat[0]))
+            if array.dtype.kind not in "US":
+                left_out[name] = OTHER_KINDS.get(array.dtype.kind, "no numbers")
+            elif array.size > 1:
+                text[parse_header(name)] = f"text, first `{array.flat[0]}` in row 0"
+            elif name.lower() in (*RATES, *PERIODS):
+                left_out[name] = "text"
             continue
         if array.size == 1:
             if name.lower() in RATES:
                 rate = float(array.item())
-            elif name.lower() in PERIODS and array.item() > 0:
-                rate = 1.0 / float(array.item())
+            elif name.lower() in PERIODS:
+                rate = 1.0 / float(array.item()) if array.item() else np.inf
             continue
-        signals[name] = _samples_first(array.astype(np.float64), name, source)
+        with np.errstate(over="ignore"):  # an infinite sample is refused later, with its row
+            signals[name] = _samples_first(array.astype(np.float64), name, source)
     if not signals:
-        raise DataError(f"{source}: no array of samples; a record needs arrays such as `u` and `y`")
-    first, *others = signals
-    for name in others:
+        others = "".join(f"; `{name}` contains {what}" for name, what in left_out.items())
+        raise DataError(f"{source}: no array of samples; a record needs arrays such as `u` and `y`{others}")
+    file.allowance.check_columns(sum(array.shape[1] for array in signals.values()))
+    first, *others_named = signals
+    for name in others_named:
         if len(signals[name]) != len(signals[first]):
             raise DataError(
                 f"{source}: `{first}` has {len(signals[first])} samples, but `{name}` has "
                 f"{len(signals[name])}; the lengths must be equal"
             )
     return [
-        Table(f"{source} (realisation {index})" if count > 1 else source, columns, text, rate, warmup)
+        Table(
+            f"{source} (realisation {index})" if count > 1 else source,
+            columns,
+            text,
+            rate,
+            warmup,
+            left_out=left_out,
+        )
         for index, (columns, warmup, count) in enumerate(_realisations(signals, source))
     ]
 
@@ -243,8 +157,3 @@ def _realisations(
                 columns[Column(numbered, numbered, array_column.unit, array_column.name)] = joined
         result.append((columns, (periods - 1) * samples, count))
     return result
-
-
-def _reason(error: Exception) -> str:
-    strerror = getattr(error, "strerror", None)
-    return strerror or (str(error).splitlines() or [type(error).__name__])[0]

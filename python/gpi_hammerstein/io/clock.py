@@ -63,6 +63,8 @@ def uniform_rate(stamps: Array, source: str) -> float:
     except DataError as error:
         hint = HINT if len(stamps) > 2 else ""
         raise DataError(f"{source}: {error}{hint}") from error
+    if not np.isfinite(rate):
+        raise DataError(f"{source}: the time stamps are too close for a sampling rate; correct their unit")
     whole = float(round(rate))
     return whole if whole and abs(rate - whole) <= 1e-6 * rate else rate
 
@@ -112,6 +114,8 @@ def resample(stamps: Array, columns: Array, rate: float | None, source: str) -> 
         raise DataError(f"{source}: the {len(stamps)} time stamps do not increase; give the rate (--rate)")
     usual = float(np.median(forward))
     rate = 1.0 / usual if rate is None else float(rate)
+    if not np.isfinite(rate * usual) or not np.isfinite(1.0 / usual):
+        raise DataError(f"{source}: the median step of the time stamps is {usual:g} s; correct their unit")
     if rate * usual > MOST_REFINED:
         raise ParameterError(
             f"`resample` = {rate:g} Hz is more than {MOST_REFINED:g} times the original rate, "

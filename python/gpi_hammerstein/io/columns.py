@@ -1,7 +1,7 @@
 """Name, unit and role of a column, from its header."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from gpi_hammerstein._native import DataError
@@ -97,6 +97,7 @@ def assign_roles(
     outputs: Sequence[str] | None = None,
     covariates: Sequence[str] | None = None,
     need_time: bool = True,
+    left_out: Mapping[str, str] | None = None,
 ) -> Roles:
     """Determine which columns are time, inputs, outputs and covariates.
 
@@ -113,6 +114,8 @@ def assign_roles(
         column is a covariate.
     need_time
         False if the rate is known. A time column is then recognised but not required.
+    left_out
+        Names of arrays of the file that are no columns, and what they contain, for messages.
 
     Returns
     -------
@@ -130,13 +133,14 @@ def assign_roles(
     >>> roles.outputs[0].name
     'y'
     """
+    there = ", ".join(column.header for column in columns)
+    there += "".join(f"; `{name}` is left out: it contains {what}" for name, what in (left_out or {}).items())
 
     def named(option: str, names: Sequence[str]) -> list[Column]:
         found: list[Column] = []
         for name in names:
             matching = [column for column in columns if column.matches(name)]
             if not matching:
-                there = ", ".join(column.header for column in columns)
                 raise DataError(f"{source}: no column `{name}` (given as {option}); the columns are: {there}")
             found += matching
         return found
@@ -161,7 +165,6 @@ def assign_roles(
     if chosen_outputs is None:
         chosen_outputs = usual(OUTPUT, [*given, *times]) or usual(MOTION, [*given, *times])
     if not chosen_inputs:
-        there = ", ".join(column.header for column in columns)
         others = [
             what
             for what, missing in (
@@ -177,7 +180,7 @@ def assign_roles(
     if not times and need_time:
         raise DataError(
             f"{source}: no time column; name one with time= (--time) or give the sampling rate in Hz "
-            "with rate= (--rate)"
+            f"with rate= (--rate). The columns are: {there}"
         )
     taken = [*given, *times, *chosen_inputs, *chosen_outputs]
     if chosen_covariates is None:

@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 
 from gpi_hammerstein._native import DataError, ParameterError, Record
-from gpi_hammerstein.io.arrays import read_mat, read_npy_pair, read_npz
 from gpi_hammerstein.io.clock import resample as put_on_grid
 from gpi_hammerstein.io.clock import uniform_rate
 from gpi_hammerstein.io.columns import TIME_UNITS, Column, Roles, assign_roles
+from gpi_hammerstein.io.formats import output_files, read_tables
 from gpi_hammerstein.io.frames import Frame, is_frame, read_frame
+from gpi_hammerstein.io.npy import read_npy_pair
 from gpi_hammerstein.io.recording import Recording, Run
-from gpi_hammerstein.io.tables import Table, read_csv, read_parquet
+from gpi_hammerstein.io.tables import Table
+
+# The seconds since 1970 have this value in the year 5138; larger stamps are in another unit.
+LATEST_SECOND = 1e11
 
 PathLike = str | os.PathLike[str]
 Names = str | Sequence[str]
@@ -40,8 +44,8 @@ def read_record(
     path
         A file, or a list of files with the same columns, whose experiments are put in one record. Formats are
         CSV (``.csv``, ``.csv.gz``, also separated by semicolons or tabs), Parquet (``.parquet``), NumPy
-        (``.npz``, ``.npy``) and MATLAB v5 or v7.3 (``.mat``). Arrays in NumPy and MATLAB files have the shape
-        (samples,), (samples, channels), (samples, channels, realisations) or (samples, channels,
+        (``.npz``, ``.npy``) and MATLAB v4, v5 or v7.3 (``.mat``). Arrays in NumPy and MATLAB files have
+        the shape (samples,), (samples, channels), (samples, channels, realisations) or (samples, channels,
         realisations, periods). Every realisation is an experiment; all of its periods except the last one are
         warm-up. A Polars or pandas data frame or an xarray dataset, with columns named as in a CSV file, is
         also accepted.
@@ -77,9 +81,20 @@ def read_record(
     ParameterError
         An option contradicts the file or is out of range.
     DataError
-        The file is missing, is empty, or contains text, NaN or infinite samples; columns are missing or have
-        different lengths; time stamps have gaps, run backwards or are not uniform. The message states the
-        column and the rows, which are counted from 0.
+        The file is missing, is not a regular file, is corrupt, is empty, or contains text, NaN or infinite
+        samples; columns are missing or have different lengths; time stamps have gaps, run backwards or are
+        not uniform. The message states the column and the rows, which are counted from 0. The file contains
+        more than a limit allows.
+
+    Notes
+    -----
+    Four limits protect against files that exhaust memory or time. They are environment variables:
+    ``GPI_MAX_READ_BYTES`` (1073741824), the size of the data of one file after decompression;
+    ``GPI_MAX_READ_RATIO`` (100), the ratio of this size to the size of the file, if the data has more than
+    16 MiB; ``GPI_MAX_READ_COLUMNS`` (1000), the number of columns or variables of one file;
+    ``GPI_MAX_READ_SECONDS`` (120), the time for a Parquet or HDF5 file. These two formats are read in another
+    process, because their libraries can end a process if a file is corrupt. An HDF5 file that refers to other
+    files is refused.
 
     Examples
     --------
@@ -147,16 +162,16 @@ def read_recording(
     sources = [one if is_frame(one) else Path(one) for one in given]
     if not sources:
         raise ParameterError("`path`: no file is given; give at least one record")
-    output_files = _output_files([one for one in sources if isinstance(one, Path)], _names(output))
+    files = output_files([one for one in sources if isinstance(one, Path)], _names(output))
     parts = []
     for one in sources:
         outputs = _names(output)
         if is_frame(one):
             tables = [read_frame(one)]
-        elif output_files:
-            tables, outputs = read_npy_pair(one, output_files.get(one)), None
+        elif files:
+            tables, outputs = read_npy_pair(one, files.get(one)), None
         else:
-            tables = _read_tables(one)
+            tables = read_tables(one)
         for table in tables:
             roles = assign_roles(
                 table.headers(),
@@ -166,6 +181,7 @@ def read_recording(
                 outputs=outputs,
                 covariates=_names(covariate),
                 need_time=rate is None and table.rate is None,
+                left_out=table.left_out,
             )
             parts.append(_read_part(table, roles, rate, resample, warmup))
     names = [str(one) if isinstance(one, Path) else "the data frame" for one in sources]
@@ -176,57 +192,6 @@ def _names(names: Names | None) -> list[str] | None:
     return None if names is None else [names] if isinstance(names, str) else list(names)
 
 
-def _read_tables(path: Path) -> list[Table]:
-    suffixes = [suffix.lower() for suffix in path.suffixes]
-    if not path.exists():
-        raise DataError(f"{path}: no such file; give a record file")
-    if suffixes[-1:] == [".parquet"]:
-        return [read_parquet(path)]
-    if suffixes[-1:] == [".npz"]:
-        return read_npz(path)
-    if suffixes[-1:] == [".mat"]:
-        return read_mat(path)
-    if suffixes[-1:] in ([".csv"], [".tsv"], [".txt"], [".dat"]) or suffixes[-1:] == [".gz"]:
-        return [read_csv(path)]
-    raise DataError(
-        f"{path}: no known format; names of record files end in .csv, .csv.gz, .parquet, .npz, .npy or .mat"
-    )
-
-
-def _output_files(paths: Sequence[Path], outputs: list[str] | None) -> dict[Path, Path | None]:
-    """Return the .npy file of the output for each .npy file of the input; empty for other formats."""
-    if not any(path.suffix == ".npy" for path in paths):
-        return {}
-    other = next((path for path in paths if path.suffix != ".npy"), None)
-    if other is not None:
-        raise ParameterError(
-            f"`path`: {other} together with .npy files; read .npy files separately, because each "
-            "of them contains only one signal"
-        )
-    for path in paths:
-        if not path.exists():
-            raise DataError(f"{path}: no such file; give a record file")
-    if outputs is None:
-        return dict.fromkeys(paths)
-    if len(outputs) != len(paths):
-        raise ParameterError(
-            f"`output` names {len(outputs)} files, but {len(paths)} .npy files of inputs are given; "
-            "give one .npy file of the output for each of them, in the same order"
-        )
-    files: dict[Path, Path | None] = {}
-    for path, name in zip(paths, outputs, strict=True):
-        file = Path(name)
-        # A file name without folder is also searched in the folder of the input.
-        if not file.exists() and (path.parent / file).exists():
-            file = path.parent / file
-        if not file.exists():
-            raise DataError(
-                f"{file}: no such file; for a .npy record, `output` is the .npy file of the output"
-            )
-        files[path] = file
-    return files
-
-
 def _read_part(
     table: Table, roles: Roles, rate: float | None, resample: bool | float | str | None, warmup: int | None
 ) -> Recording:
@@ -235,6 +200,7 @@ def _read_part(
     table.require_numbers(signals)
     samples = table.stack(signals)
     pieces, notes, starts = [samples], [*table.notes], [0.0]
+    notes += [f"`{name}` is left out: it contains {what}" for name, what in table.left_out.items()]
     given = rate or table.rate
     if roles.time is not None and rate is None:
         table.require_numbers([roles.time])
@@ -250,6 +216,11 @@ def _read_part(
             notes.append(found.note)
             starts = [0.0] * len(pieces)
         else:
+            if not roles.time.unit and abs(stamps[0]) > LATEST_SECOND:
+                raise DataError(
+                    f"{table.source}: `{roles.time.header}` starts at {stamps[0]:.15g}, which is no time in "
+                    f"seconds; add its unit to the name, as in `{roles.time.header}_ms`"
+                )
             given, starts = uniform_rate(stamps, table.source), [float(stamps[0])]
             if not roles.time.unit and (stamps == np.rint(stamps)).all():
                 notes.append(
@@ -261,6 +232,11 @@ def _read_part(
             f"`resample`: {table.source} has no time stamps, which resampling needs; give the rate (--rate)"
         )
     assert given is not None  # assign_roles requires a time column otherwise
+    if not (np.isfinite(given) and given > 0):
+        raise DataError(
+            f"{table.source}: the file states a sampling rate of {given:g} Hz, which must be positive and "
+            "finite; give the rate in Hz with rate= (--rate)"
+        )
     inputs, outputs = len(roles.inputs), len(roles.outputs)
     start_of_covariates = inputs + outputs
     runs = [

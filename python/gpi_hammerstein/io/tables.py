@@ -1,19 +1,15 @@
-"""Reading of CSV and Parquet files."""
+"""Tables of numbers: what every format is converted to."""
 
-import io
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, field
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
 from gpi_hammerstein._native import DataError
-from gpi_hammerstein.escaping import visible
 from gpi_hammerstein.io.columns import Column, parse_header
-from gpi_hammerstein.io.forked import require_threads
-from gpi_hammerstein.io.header import DECIMAL_COMMA, find_header, is_number
+from gpi_hammerstein.io.header import DECIMAL_COMMA
 
 Array = NDArray[np.float64]
 
@@ -24,14 +20,16 @@ class Table:
 
     source: str
     columns: dict[Column, Array]
-    text: dict[Column, tuple[int, str]]
-    """Columns that contain text: the first row with text, and this text."""
+    text: dict[Column, str]
+    """Columns that do not contain numbers: what they contain, and where."""
     rate: float | None = None
     """The sampling rate in Hz, if the file contains it."""
     warmup: int = 0
     """Number of samples at the start that are warm-up."""
     notes: list[str] = field(default_factory=list)
     """Notes on lines of the file that were skipped."""
+    left_out: dict[str, str] = field(default_factory=dict)
+    """Names of the arrays of the file that are no columns, and what they contain."""
 
     def headers(self) -> list[Column]:
         """Return all columns."""
@@ -47,11 +45,10 @@ class Table:
         """
         for column in columns:
             if column in self.text:
-                row, cell = self.text[column]
                 raise DataError(
-                    f"{self.source}: column `{column.header}` holds text, first `{visible(cell)}` in row "
-                    f"{row} (the rows below the names are counted from 0); correct or remove such rows; if "
-                    "the column is no input, output or time, ignore it (covariate=[], --covariate none)"
+                    f"{self.source}: column `{column.header}` holds {self.text[column]} "
+                    "(the rows below the names are counted from 0); correct or remove such rows; if the "
+                    "column is no input, output or time, ignore it (covariate=[], --covariate none)"
                 )
             rows = np.flatnonzero(~np.isfinite(self.columns[column]))
             if rows.size:
@@ -66,103 +63,6 @@ class Table:
         """Return the columns as one array, (samples, columns)."""
         rows = len(next(iter(self.columns.values())))
         return np.column_stack([np.empty((rows, 0)), *(self.columns[column] for column in columns)])
-
-
-def read_csv(path: Path) -> Table:
-    """Read a CSV file, which may be compressed with gzip.
-
-    Parameters
-    ----------
-    path
-        The file, separated by commas, semicolons or tabs, in UTF-8 or Latin-1. The names are the last line
-        above the numbers, or the line above a line of units. Lines above the names and lines that start with
-        ``#`` are skipped. If the separator is not a comma, numbers may have a decimal comma.
-
-    Returns
-    -------
-    Table
-        The columns. Empty cells are NaN.
-
-    Raises
-    ------
-    DataError
-        The file is empty, has no header, or has rows with more cells than the header.
-
-    Examples
-    --------
-    >>> read_csv(Path("record.csv")).headers()  # doctest: +SKIP
-    """
-    try:
-        data = path.read_bytes()
-        if data[:2] == b"\x1f\x8b":
-            import gzip
-
-            data = gzip.decompress(data)
-        text = decoded(data)
-    except (OSError, EOFError) as error:
-        raise DataError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
-    except UnicodeDecodeError:
-        raise DataError(f"{path}: not a text file; a CSV record is text, in UTF-8 or Latin-1") from None
-    header = find_header(text)
-    if header is None:
-        raise DataError(f"{path}: the file is empty; a record has a header line and one row for each sample")
-    names = header.names
-    if all(map(is_number, names)):
-        first = header.separator.join(names)[:60]
-        raise DataError(f"{path}: no header line (row 0 reads `{first}`); add one such as `t_s,u_V,y_um`")
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise DataError(f"{path}: {names.count(repeated[0])} columns are named `{repeated[0]}`; rename them")
-    if not header.rows:
-        raise DataError(
-            f"{path}: no rows below the header line `{header.separator.join(names)[:60]}`; a record has one "
-            "row for each sample"
-        )
-    require_threads()
-    try:
-        frame = pl.read_csv(
-            io.BytesIO(header.rows.encode()),
-            separator=header.separator,
-            has_header=False,
-            new_columns=names,
-            comment_prefix="#",
-            infer_schema=False,
-        )
-    except pl.exceptions.PolarsError as error:
-        raise DataError(f"{path}: cannot be read as CSV: {str(error).splitlines()[0]}") from error
-    return replace(from_frame(frame, str(path)), notes=header.notes)
-
-
-def read_parquet(path: Path) -> Table:
-    """Read a Parquet file.
-
-    Parameters
-    ----------
-    path
-        The file, with columns of numbers and names such as ``t_s``, ``u_V``, ``y_um``.
-
-    Returns
-    -------
-    Table
-        The columns. Null values are NaN.
-
-    Raises
-    ------
-    DataError
-        The file is empty or is not a Parquet file.
-
-    Examples
-    --------
-    >>> read_parquet(Path("record.parquet")).headers()  # doctest: +SKIP
-    """
-    require_threads()
-    try:
-        frame = pl.read_parquet(io.BytesIO(path.read_bytes()))
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
-    except pl.exceptions.PolarsError as error:
-        raise DataError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from error
-    return from_frame(frame, str(path))
 
 
 def from_frame(frame: pl.DataFrame, source: str) -> Table:
@@ -188,41 +88,63 @@ def from_frame(frame: pl.DataFrame, source: str) -> Table:
     Examples
     --------
     >>> from_frame(pl.DataFrame({"u_V": ["1", "x"]}), "demo").text
-    {Column(header='u_V', name='u', unit='V', array='u_V'): (1, 'x')}
+    {Column(header='u_V', name='u', unit='V', array='u_V'): 'text, first `x` in row 1'}
     """
     if frame.height == 0:
         raise DataError(
             f"{source}: the file is empty: a header without rows; a record has one row for each sample"
         )
     columns: dict[Column, Array] = {}
-    text: dict[Column, tuple[int, str]] = {}
-    for series in frame:
-        column = parse_header(series.name)
-        if series.dtype == pl.String:
-            cells = series.str.strip_chars()
-            cells = cells.set(cells == "", None)
-            # a comma within a cell is a decimal comma, because the separator is then another character
-            if cells.str.contains(DECIMAL_COMMA).fill_null(True).all():
-                cells = cells.str.replace(",", ".", literal=True)
-            numbers = cells.cast(pl.Float64, strict=False)
-            wrong = (numbers.is_null() & cells.is_not_null()).arg_true()
-            if len(wrong):
-                text[column] = (int(wrong[0]), str(cells[int(wrong[0])]))
-                continue
-        elif series.dtype.is_numeric() or series.dtype == pl.Boolean:
-            numbers = series.cast(pl.Float64)
+    text: dict[Column, str] = {}
+    frame, wrong = _numbers_of_texts(frame)
+    numeric = [name for name, kind in frame.schema.items() if kind.is_numeric() or kind == pl.Boolean]
+    # All columns at once, because a call for each of many columns is slow.
+    numbers = frame.select(pl.col(numeric).cast(pl.Float64).fill_null(float("nan")))
+    there = dict(zip(numbers.columns, numbers.get_columns(), strict=True))
+    for name, kind in frame.schema.items():
+        column = parse_header(name)
+        if name in there:
+            columns[column] = there[name].to_numpy().astype(np.float64)
         else:
-            text[column] = (0, str(series[0]))
-            continue
-        columns[column] = numbers.fill_null(float("nan")).to_numpy().astype(np.float64)
+            text[column] = wrong.get(name, f"values of the type {kind}")
     return Table(source, columns, text)
 
 
-def decoded(data: bytes) -> str:
-    """Return the text of a file, in UTF-8 or else in Latin-1, which some data loggers write."""
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        if b"\0" in data:
-            raise
-        return data.decode("latin-1")
+def _numbers_of_texts(frame: pl.DataFrame) -> tuple[pl.DataFrame, dict[str, str]]:
+    """Convert the columns of text that contain only numbers.
+
+    Returns the frame, and the first text of each column that could not be converted.
+    """
+    cells = frame.select(pl.col(pl.String).str.strip_chars())
+    cells = cells.select(pl.when(pl.all() != "").then(pl.all()))
+    if not cells.width:
+        return frame, {}
+    # A comma within a cell is a decimal comma, because the separator is then another character.
+    commas = cells.select(pl.all().str.contains(DECIMAL_COMMA).fill_null(True).all()).row(0)
+    replaced = [name for name, found in zip(cells.columns, commas, strict=True) if found]
+    numbers = cells.with_columns(pl.col(replaced).str.replace(",", ".", literal=True))
+    numbers = numbers.select(pl.all().cast(pl.Float64, strict=False))
+    before, after = cells.null_count().row(0), numbers.null_count().row(0)
+    wrong = {}
+    for name, empty, lost in zip(cells.columns, before, after, strict=True):
+        if lost > empty:
+            row = int((numbers[name].is_null() & cells[name].is_not_null()).arg_true()[0])
+            wrong[name] = f"text, first `{shortened(cells[name][row])}` in row {row}"
+    return frame.with_columns(numbers.drop(list(wrong))), wrong
+
+
+def shortened(text: str) -> str:
+    """Return the start of a text in one line, for messages.
+
+    Parameters
+    ----------
+    text
+        The text, which can contain a whole file.
+
+    Examples
+    --------
+    >>> shortened("no number")
+    'no number'
+    """
+    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text[:61])
+    return shown if len(shown) <= 60 else f"{shown[:60]}.."
