@@ -229,7 +229,6 @@ gpi_compensator_real gpi_compensator_step(gpi_compensator_state *state, gpi_comp
     int i;
     if (!is_finite(reference)) {
         state->faults |= GPI_COMPENSATOR_NOT_FINITE;
-        creep_on(state, state->plays[0]);
         return state->drive;
     }
     for (i = 0; i < LAGS; ++i)

@@ -84,7 +84,7 @@ pub struct Faults {
 /// What happens at bad samples:
 ///
 /// - The drive and the state are finite after every sequence of references, and the drive is within its limits.
-/// - A reference that is NaN or infinite holds the drive. [`Compensator::standing_at`] takes it as 2,
+/// - A reference that is NaN or infinite changes neither the drive nor the state. [`Compensator::standing_at`] takes it as 2,
 ///   where v = 0.
 /// - v is limited to -170.338 .. 171.423. In the steady state, these are the references
 ///   -181.965 .. 187.137. A drive at its limit within this range is no fault.
@@ -92,7 +92,7 @@ pub struct Faults {
 /// - After m bad and n good samples, v differs from the v without the bad samples by at most m * 0.0546 * 0.99980002^n,
 ///   apart from rounding errors, if all gains of creep have the sign of the gain.
 ///   The plays return to the same state when v has moved up and down by twice the largest half-width, 32.618. Until
-///   then, the drive is the right one for the actuator, which has followed the bad samples too.
+///   then, the drive is the right one for the actuator, which has followed the drive too.
 #[derive(Clone, Debug)]
 pub struct Compensator {
     plays: [Real; PLAYS],
@@ -124,7 +124,6 @@ impl Compensator {
     pub fn step(&mut self, reference: Real) -> Real {
         if !reference.is_finite() {
             self.faults.not_finite = true;
-            self.creep_on(self.plays[0]);
             return self.drive;
         }
         let mut creep = 0.0;

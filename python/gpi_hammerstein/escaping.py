@@ -97,8 +97,8 @@ def in_c(text: str) -> str:
 
     Examples
     --------
-    >>> in_c("m*/s"), in_c("u??/")
-    ('m* /s', 'u? ?/')
+    >>> in_c("m*/s"), in_c("u??/v")
+    ('m* /s', 'u? ?/v')
     """
     text = re.sub(r"(?<=\*)(?=/)|(?<=/)(?=\*)|(?<=\?)(?=\?)", " ", visible(text))
     # a unit may follow a name directly, so the ends are protected too

@@ -68,13 +68,27 @@ static real good(int k)
 
 int main(void)
 {
-    STATE clean, hurt;
+    STATE clean, hurt, worn;
     unsigned long done = 0, compared = 0, at_limit = 0;
+    START(&worn, good(0));
     while (done < SAMPLES) {
-        const int bad = 1 + (int)(next() % 8), started = (int)(next() % 16) == 0;
+        int bad, started, burst, k;
         double bound;
-        unsigned expected = 0;
-        int k;
+        unsigned expected;
+        /* most bursts hit one state, which is never reset */
+        for (burst = 0; burst < 32; ++burst) {
+            for (k = 0; k < 8; ++k, ++done) {
+                STEP(&worn, hostile());
+                if (is_wrong(&worn))
+                    return 1;
+            }
+            STEP(&worn, good(burst));
+            if (is_wrong(&worn))
+                return 1;
+        }
+        bad = 1 + (int)(next() % 8);
+        started = (int)(next() % 16) == 0;
+        expected = 0;
         START(&clean, good(0));
         hurt = clean;
         if (hurt.faults != 0)

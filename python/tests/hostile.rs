@@ -37,7 +37,16 @@ fn main() {
     let mut draw = Draw(88172645463325252);
     let (mut done, mut compared) = (0, 0);
     assert!(V_LOW <= 0.0 && V_HIGH >= 0.0);
+    let mut worn = Compensator::standing_at(good(0));
     while done < SAMPLES {
+        // most bursts hit one state, which is never reset
+        for burst in 0..32 {
+            for _ in 0..8 {
+                check(worn.step(draw.hostile()));
+                done += 1;
+            }
+            check(worn.step(good(burst)));
+        }
         let bad = 1 + (draw.next() % 8) as u32;
         let mut clean = Compensator::standing_at(good(0));
         assert_eq!(clean.faults(), Faults::default());
