@@ -44,6 +44,8 @@ mod model;
 #[cfg(feature = "identify")]
 mod optimize;
 #[cfg(feature = "identify")]
+mod parallel;
+#[cfg(feature = "identify")]
 mod progress;
 #[cfg(feature = "identify")]
 mod record;

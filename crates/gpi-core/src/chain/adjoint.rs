@@ -49,6 +49,7 @@ use super::tangents::{Trace, sensed};
 use crate::effects::{InnerLoop, Sees, Slope};
 use crate::linear::{Section, dot};
 use crate::optimize::Loss;
+use crate::parallel::install;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{DMatrixView, DVector};
 use rayon::prelude::*;
@@ -68,12 +69,12 @@ pub(crate) fn descent(
 ) -> Result<(DVector<f64>, f64), Error> {
     let mut sum = (DVector::zeros(table.len), 0.0);
     let all: Vec<(usize, &Experiment)> = record.experiments().iter().enumerate().collect();
-    for some in all.chunks(rayon::current_num_threads()) {
+    for some in all.chunks(install(rayon::current_num_threads)) {
         check()?;
         let of = |&(index, experiment): &(usize, &Experiment)| {
             descent_of(point, table, freedom, loss, experiment, index)
         };
-        let found: Vec<_> = some.par_iter().map(of).collect();
+        let found: Vec<_> = install(|| some.par_iter().map(of).collect());
         for one in found {
             let (descent, cost) = one?;
             sum = (sum.0 + descent, sum.1 + cost);

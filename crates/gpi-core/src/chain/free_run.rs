@@ -23,6 +23,7 @@ use super::stream::hats;
 use crate::chain::hysteresis::Parameters;
 use crate::effects::{ClosedLoops, InnerLoop, PlayCurves, Stage};
 use crate::linear::{Section, Sections};
+use crate::parallel::install;
 use crate::{Error, Experiment, Matrix, Model, Record};
 use nalgebra::RowDVector;
 use rayon::prelude::*;
@@ -154,7 +155,7 @@ impl Point {
     /// Measured minus simulated outputs of each experiment, (samples, outputs), warm-ups included.
     pub(crate) fn residuals(&self, record: &Record) -> Result<Vec<Matrix>, Error> {
         let runs = record.experiments().par_iter().zip(&self.offsets).enumerate();
-        runs.map(|(index, (experiment, offsets))| {
+        let residual = |(index, (experiment, offsets)): (usize, (&Experiment, &Matrix))| {
             let samples = experiment.input.nrows();
             let known = self.signals(experiment, index)?;
             let output = self.output_from(Stage::Added, &known, experiment, index)?;
@@ -166,8 +167,8 @@ impl Point {
                 }
             }
             Ok(residual)
-        })
-        .collect()
+        };
+        install(|| runs.map(residual).collect())
     }
 
     /// The mean additive term of each output, experiments counted by their scored samples: the mean over the whole length of

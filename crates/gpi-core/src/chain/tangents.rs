@@ -36,6 +36,7 @@ use super::table::{Group, Table};
 use super::tiles::{Shape, Tile, tiles};
 use crate::effects::{InnerLoop, OutputStage, Sees, Slope};
 use crate::linear::Section;
+use crate::parallel::install;
 use crate::{Experiment, Matrix};
 use pulp::Simd;
 use rayon::prelude::*;
@@ -132,7 +133,7 @@ impl<'a> Tangents<'a> {
             pulp::Arch::new().dispatch(Advance { tangents: this, tile, trace });
         };
         if tiles.len() * trace.samples.len() * self.places.len > PARALLEL {
-            tiles.par_iter_mut().for_each(advance);
+            install(|| tiles.par_iter_mut().for_each(advance));
         } else {
             tiles.iter_mut().for_each(advance);
         }

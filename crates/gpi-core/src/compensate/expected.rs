@@ -16,6 +16,7 @@
 //! adapted to the training data.
 
 use super::start::Start;
+use crate::parallel::install;
 use crate::settings::{FROM_ONE, PART, POSITIVE, settings};
 use crate::{Error, Matrix, Model, ModelState};
 use rayon::prelude::*;
@@ -149,7 +150,7 @@ impl Run<'_> {
         let (rows, outputs) = (self.predicted.nrows() - self.lead, self.predicted.ncols());
         let none = || Matrix::zeros(rows, outputs);
         let sum = |a: Matrix, b: Matrix| Ok(a + b);
-        prediction.axes.par_iter().map(along).try_reduce(none, sum).map(Some)
+        install(|| prediction.axes.par_iter().map(along).try_reduce(none, sum)).map(Some)
     }
 
     /// The misfit of each output, scaled to the movement of its reference.

@@ -7,6 +7,7 @@
 
 use crate::Error;
 use crate::Progress;
+use crate::parallel::install;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
@@ -31,7 +32,7 @@ pub(super) fn concurrently<J: Send, T: Send>(
                 };
                 work(job, &mut own)
             };
-            jobs.into_par_iter().map(one).collect()
+            install(|| jobs.into_par_iter().map(one).collect())
         });
         for (stage, done) in told {
             if !progress(&stage, done) {

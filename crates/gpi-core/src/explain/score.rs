@@ -29,6 +29,7 @@ use super::policy::score::{AT_ONCE, LEFT, MANY, OWN_RANK};
 use super::projection::Projection;
 use crate::chain::free_run::Signals;
 use crate::effects::{Effect, Place, Proposal};
+use crate::parallel::install;
 use crate::uncertainty::covariance::descending_eigen;
 use crate::{Error, Experiment, Matrix};
 use nalgebra::DVector;
@@ -80,7 +81,7 @@ fn score(base: &Base, candidates: &[Proposal<Effect>]) -> Result<Vec<Score>, Err
     let probes = candidates.iter().map(|candidate| candidate.probes.len()).sum();
     let columns = |known: &Signals, here: &Matrix, experiment: &Experiment, index: usize| {
         let of = |candidate| columns(base, candidate, known, here, experiment, index);
-        let columns: Result<Vec<_>, Error> = candidates.par_iter().map(of).collect();
+        let columns: Result<Vec<_>, Error> = install(|| candidates.par_iter().map(of).collect());
         Ok(columns?.into_iter().flatten().collect())
     };
     let projection = base.project(probes, &columns)?;
@@ -112,7 +113,7 @@ fn columns(
         return Ok(columns.into_iter().zip(block.steps()).map(|(c, step)| c * step).collect());
     }
     let gained = |probe: &Effect| base.point.gained_by(probe, known, here, experiment, index);
-    candidate.probes.par_iter().map(gained).collect()
+    install(|| candidate.probes.par_iter().map(gained).collect())
 }
 
 /// The score of a candidate whose columns begin at `first`.

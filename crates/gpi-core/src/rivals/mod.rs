@@ -32,6 +32,7 @@ pub(crate) use plays::Plays;
 pub(crate) use settings::RivalPolicy;
 pub(crate) use units::Units;
 
+use crate::parallel::install;
 use crate::{Error, Matrix, Record, SimulationError};
 use rayon::prelude::*;
 
@@ -135,7 +136,8 @@ pub(crate) fn fit(
     let scaled = units.scaled(training)?;
     let elsewhere = holdout.map(|other| units.scaled(other)).transpose()?;
     let kinds = [polynomial::fit, plays::fit, fir::fit, arx::fit];
-    let models: Vec<Option<Model>> = kinds.par_iter().map(|fit| fit(&scaled, policy)).collect();
+    let models: Vec<Option<Model>> =
+        install(|| kinds.par_iter().map(|fit| fit(&scaled, policy)).collect());
     let finished = |model: Model| Fitted {
         name: model.name,
         residuals: units.residuals(&scaled, &(model.simulate)(&scaled)),

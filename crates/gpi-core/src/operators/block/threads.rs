@@ -3,6 +3,7 @@
 use super::bank;
 use super::lanes::settled;
 use super::ranked::Ranked;
+use crate::parallel::install;
 use rayon::prelude::*;
 
 /// The outputs of a bank of plays, as [`bank::run`].
@@ -18,7 +19,8 @@ pub(crate) fn run(
 ) {
     let ranked = Ranked::new(half_widths, weights);
     let stretch = input.len().div_ceil(threads.max(1)).max(1);
-    let is_finite = input.par_chunks(1 << 16).all(|part| part.iter().all(|z| z.is_finite()));
+    let is_finite =
+        install(|| input.par_chunks(1 << 16).all(|part| part.iter().all(|z| z.is_finite())));
     let began = |begin| if is_finite { settled(&ranked, &input[..begin], stretch) } else { None };
     let begins = (stretch..input.len()).step_by(stretch).map(began);
     let states: Option<Vec<_>> = std::iter::once(Some(places.to_vec())).chain(begins).collect();
@@ -26,8 +28,10 @@ pub(crate) fn run(
         return bank::run((half_widths, weights), places, Some(input), output);
     };
     let parts = input.par_chunks(stretch).zip(output.par_chunks_mut(stretch)).zip(&mut states);
-    parts.for_each(|((input, output), places)| {
-        bank::run((half_widths, weights), places, Some(input), output);
+    install(|| {
+        parts.for_each(|((input, output), places)| {
+            bank::run((half_widths, weights), places, Some(input), output);
+        });
     });
     if let Some(last) = states.last() {
         places.copy_from_slice(last);
