@@ -23,7 +23,7 @@ def test_files_that_broke_something_are_refused_or_simulated(path: Path) -> None
     try:
         model = gpi.load(path)
         u = np.linspace(0.0, 1.0, 200)
-        y = model.simulate(u if len(model.inputs) == 1 else np.tile(u[:, None], len(model.inputs)))
+        y = model.simulate(u if len(model.input_names) == 1 else np.tile(u[:, None], len(model.input_names)))
     except gpi.GpiError as error:
         assert str(error)
         return
