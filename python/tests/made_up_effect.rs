@@ -37,6 +37,7 @@ impl MadeUpEffect {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["level"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     /// Both periods of each output that is measured in um and moves by two periods or more.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {

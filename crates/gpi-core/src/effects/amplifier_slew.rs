@@ -27,6 +27,7 @@ impl AmplifierSlew {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["speed"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     /// Limits at quantiles of the record's steps: an amplifier that is slower than most of the steps is seen
     /// without a search.

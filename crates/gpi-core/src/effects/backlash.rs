@@ -28,6 +28,7 @@ impl Backlash {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["direction"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     /// Half-widths between a ten-thousandth and a fifth of the span.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {

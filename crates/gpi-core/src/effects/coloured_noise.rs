@@ -31,6 +31,7 @@ impl ColouredNoise {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["whiteness"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = true;
+    pub(super) const IS_EXPANSION: bool = false;
 }
 
 impl Finding for ColouredNoise {

@@ -44,6 +44,7 @@ impl Covariate {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
     pub(super) const SHOWN_BY: &'static [&'static str] = &[];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let shortest = 1.0 / situation.record.rate();

@@ -52,6 +52,7 @@ impl Creep {
     pub(super) const SHOWN_BY: &'static [&'static str] =
         &["past-input", "past-intermediate", "trend"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     /// One, two and three lags between the shortest time constant and the record's length.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {

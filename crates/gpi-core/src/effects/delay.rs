@@ -29,6 +29,7 @@ impl Delay {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["past-input"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let delays =

@@ -34,6 +34,7 @@ impl Drift {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Rests;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["mean", "trend"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let duration = situation.duration();

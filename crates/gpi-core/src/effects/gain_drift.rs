@@ -31,6 +31,7 @@ impl GainDrift {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Rests;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["trend"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let duration = situation.duration();

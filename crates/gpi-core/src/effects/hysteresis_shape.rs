@@ -52,6 +52,7 @@ impl HysteresisShape {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["direction"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = true;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         /// A and B.

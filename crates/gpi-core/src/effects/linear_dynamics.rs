@@ -37,6 +37,7 @@ impl LinearDynamics {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["past-input", "past-intermediate"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     /// Lightly damped modes between ten periods a record and close to half the sampling rate.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {

@@ -78,6 +78,7 @@ macro_rules! catalogue {
                 separated_by: $effect::SEPARATED_BY,
                 shown_by: $effect::SHOWN_BY,
                 explains_autocorrelation: $effect::EXPLAINS_AUTOCORRELATION,
+                is_expansion: $effect::IS_EXPANSION,
                 proposals: proposals!($effect: $place),
             };
         })*
@@ -139,6 +140,8 @@ pub struct Entry {
     pub shown_by: &'static [&'static str],
     /// Whether a residual's autocorrelation is explained once it is found.
     pub explains_autocorrelation: bool,
+    /// Whether it is a truncated expansion of an unknown function of the motion. What it leaves follows the motion, too.
+    pub is_expansion: bool,
     /// The blocks that the search tries on a base model; none of a finding.
     pub(crate) proposals: fn(&Situation) -> Vec<Proposal<Effect>>,
 }

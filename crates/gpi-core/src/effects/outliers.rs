@@ -28,6 +28,7 @@ impl Outliers {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["outliers"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 }
 
 impl Finding for Outliers {

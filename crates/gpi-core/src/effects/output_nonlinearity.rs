@@ -32,6 +32,7 @@ impl OutputNonlinearity {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["level"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let block = |output, terms: usize| {

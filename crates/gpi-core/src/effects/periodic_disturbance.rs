@@ -40,6 +40,7 @@ impl PeriodicDisturbance {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Nothing;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["lines"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     /// The line of the residual's spectrum with the largest ratio to its neighbours.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {

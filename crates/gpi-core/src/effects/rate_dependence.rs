@@ -63,6 +63,7 @@ impl RateDependence {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Speeds;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["speed"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         /// Exponents, and knees over the median speed.

@@ -40,6 +40,7 @@ impl Stiffness {
     pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
     pub(super) const SHOWN_BY: &'static [&'static str] = &["amplitude", "level-to-level"];
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
 
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         // a first-order lag has no resonance

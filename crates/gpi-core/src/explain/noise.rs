@@ -16,6 +16,8 @@
 //! - no test of structure fails;
 //! - s_w < (1 - p) s_e on the training data and, with the same a_i, on the held-out blocks;
 //! - s_w is near the noise floor, because the fast part of coloured noise is in its innovations;
+//! - s_e is near the noise floor, too, if the model has an effect that is a truncated expansion: the terms that it lacks
+//!   leave a residual that follows the motion, in ways that no test need see;
 //! - s_e is near the noise at rest, or a small part of the output's span where the input never rests;
 //! - the kurtosis `mean(e^4) / mean(e^2)^2` is near 3, that of a stationary Gaussian process of any autocorrelation: an
 //!   error that comes in bursts while the stage moves has more.
@@ -115,7 +117,10 @@ fn memory(
     };
     // what is predictable from its past alone leaves innovations that are as fast as the noise
     let is_fast = innovation > policy.innovation * floor.rms[output];
+    let is_expanded = state.point.effects.iter().any(|effect| effect.entry().is_expansion);
+    let is_rest = is_expanded && own > policy.innovation * floor.rms[output];
     if is_fast
+        || is_rest
         || own > loudest
         || kurtosis(residuals, &state.prepared.record, output) > policy.kurtosis
     {
