@@ -19,7 +19,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # `make test` always runs its checks in the same order, also with `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam kill-writes fuzz-readers fuzz-models clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam kill-writes fuzz-readers fuzz-models miri reliability clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -113,6 +113,12 @@ fuzz-models: ## Read and use 1,000,000 mutated model files of a new seed and cou
 
 fuzz-readers: $(NATIVE) ## Read 100,000 mutated record files of a new seed and count the results by class
 	$(BIN)/python tools/fuzz_readers.py --number 100000
+
+miri: ## Run the tests of the operators in Miri, which finds undefined behaviour (needs the nightly toolchain)
+	cargo +nightly miri test -p gpi-core --no-default-features --lib
+
+reliability: $(NATIVE) ## Attack the package with hostile files and killed runs and write docs/reliability.md
+	$(BIN)/python tools/reliability.py --markdown docs/reliability.md
 
 clean: ## Remove the environment, all builds and all caches
 	cargo clean

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use numpy::ndarray::{Array1, Array2, Array3, ArrayViewD};
 use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyTuple};
+use pyo3::types::{PyDict, PyList, PyTuple, PyWeakrefReference};
 
 /// Runs `read` on anything that NumPy turns into an array of floats.
 fn with_array<T>(
@@ -22,8 +22,25 @@ fn with_array<T>(
         .call_method("asarray", (value,), Some(&options))
         .map_err(|error| parameter(format!("`{name}` is not an array of numbers: {error}")))?;
     let array = array.cast_into::<PyArrayDyn<f64>>()?;
+    let _pinned = pinned(&array)?;
     let array = array.try_readonly()?;
     read(array.as_array())
+}
+
+/// Keeps the memory of an array, and of the arrays of which it is a view, where it is.
+///
+/// While Rust reads an array without the interpreter's lock, another thread may call `resize(..., refcheck=False)` on it,
+/// which frees the memory. NumPy refuses that for an array that has a weak reference, whatever `refcheck` is.
+fn pinned<'py>(
+    array: &Bound<'py, PyArrayDyn<f64>>,
+) -> PyResult<Vec<Bound<'py, PyWeakrefReference>>> {
+    let mut pins = Vec::new();
+    let mut next = Some(array.as_any().clone());
+    while let Some(own) = next.filter(|own| own.cast::<PyUntypedArray>().is_ok()) {
+        pins.push(PyWeakrefReference::new(&own)?);
+        next = Some(own.getattr("base")?);
+    }
+    Ok(pins)
 }
 
 fn dimensions<T>(name: &str, shape: &[usize], expected: &str) -> PyResult<T> {
