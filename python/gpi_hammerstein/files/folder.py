@@ -21,9 +21,10 @@ def staged(out: str | os.PathLike[str]) -> Iterator[Path]:
 
     Other files in `out` stay. A file that is replaced keeps its permissions, and a link is followed and
     stays. If the process is killed at any moment, `out` has either all old files or all new ones, and the
-    next run removes what was temporary. There is one exception: if `out` is the current folder of a process,
-    a mount point, a folder of another user, or contains links among the results, the files are renamed one by
-    one; if the process is killed within this fraction of a millisecond, the next run completes it.
+    next run removes what was temporary. There is one exception: the files are renamed one by one if `out` is
+    the current folder of a process, a mount point or a folder of another user, if its parent cannot be
+    written, or if it has links among the results, more than 1000 other files, or temporary files of a run
+    that still works. If the process is killed during these renames, the next run completes them.
 
     Parameters
     ----------

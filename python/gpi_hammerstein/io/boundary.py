@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gpi_hammerstein._native import DataError, GpiError
+from gpi_hammerstein.escaping import visible
 from gpi_hammerstein.io.limits import Allowance
 
 SPECIAL = (
@@ -115,4 +116,4 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, KeyError | IndexError | AttributeError | AssertionError | TypeError):
         # The message alone is only a key or a name.
         line = f"its content is inconsistent ({type(error).__name__}: {line})"
-    return "".join(c if c.isprintable() else "?" for c in line)[:LONGEST_REASON]
+    return visible(line)[:LONGEST_REASON]

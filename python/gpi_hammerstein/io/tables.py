@@ -8,6 +8,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from gpi_hammerstein._native import DataError
+from gpi_hammerstein.escaping import visible
 from gpi_hammerstein.io.columns import Column, parse_header
 from gpi_hammerstein.io.header import DECIMAL_COMMA
 
@@ -146,5 +147,5 @@ def shortened(text: str) -> str:
     >>> shortened("no number")
     'no number'
     """
-    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text[:61])
+    shown = visible(text[:61])
     return shown if len(shown) <= 60 else f"{shown[:60]}.."

@@ -118,9 +118,9 @@ fn memory(
     // what is predictable from its past alone leaves innovations that are as fast as the noise
     let is_fast = innovation > policy.innovation * floor.rms[output];
     let is_expanded = state.point.effects.iter().any(|effect| effect.entry().is_expansion);
-    let is_rest = is_expanded && own > policy.innovation * floor.rms[output];
+    let is_remainder = is_expanded && own > policy.innovation * floor.rms[output];
     if is_fast
-        || is_rest
+        || is_remainder
         || own > loudest
         || kurtosis(residuals, &state.prepared.record, output) > policy.kurtosis
     {
