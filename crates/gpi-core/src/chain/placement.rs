@@ -8,7 +8,6 @@
 
 use super::point::Point;
 use super::table::{Group, Table};
-use crate::Matrix;
 
 impl Point {
     /// The point with one more play, where there is none of its half-width; its initial place is the mean of those of
@@ -118,15 +117,18 @@ impl Point {
     /// Takes the weight from the deadzone, the identity apart, that has the largest share in each
     /// direction that the data do not determine; says whether there was one.
     ///
-    /// `open` is (unknowns, directions), its columns of length one in unknowns that are scaled by their sensitivities
-    /// ([`Uncertainty::open`](crate::uncertainty::covariance::Uncertainty)). The share is an element's absolute value. The
+    /// `open` has a list of unknowns with their shares for each direction, of length one in unknowns that are scaled by their
+    /// sensitivities ([`Uncertainty::open`](crate::uncertainty::covariance::Uncertainty)). The sign of a share is ignored. The
     /// other unknowns of the direction can take over what the deadzone did; a fit afterwards makes them do so.
-    pub(crate) fn silence_deadzones(&mut self, table: &Table, open: &Matrix) -> bool {
+    pub(crate) fn silence_deadzones(&mut self, table: &Table, open: &[Vec<(usize, f64)>]) -> bool {
         /// Where it has a smaller share, the direction is about something else.
         const SHARE: f64 = 0.3;
         let mut silenced = false;
-        for direction in open.column_iter() {
-            let share = |i: &usize| direction[*i].abs();
+        for direction in open {
+            let share = |i: &usize| {
+                let found = direction.iter().find(|(unknown, _)| unknown == i);
+                found.map_or(0.0, |(_, share)| share.abs())
+            };
             let zones = (0..self.channels.len()).flat_map(|input| {
                 let unknowns = table.range(Group::Slopes { input });
                 unknowns.skip(1).zip(1..).map(move |(i, place)| (input, place, i))

@@ -127,23 +127,34 @@ impl Table {
         found.map_or(0..0, |(_, range)| range.clone())
     }
 
-    /// The unknowns that the output of an experiment depends on, ascending: all but the offsets and initial states of
-    /// other experiments.
-    pub(crate) fn of_experiment(&self, index: usize) -> Vec<usize> {
-        let own = self.rows.iter().filter(|(group, _)| {
-            let (Offsets { experiment } | Plays { experiment, .. } | State { experiment }) = *group
-            else {
-                return true;
-            };
-            experiment == index
-        });
-        own.flat_map(|(_, range)| range.clone()).collect()
+    /// The table of the unknowns that the output of an experiment depends on, and their places in this one, ascending:
+    /// all but the offsets and initial states of other experiments.
+    pub(crate) fn of_experiment(&self, index: usize) -> (Self, Vec<usize>) {
+        let (mut rows, mut places) = (Vec::new(), Vec::new());
+        for (group, range) in self.rows.iter().filter(|(group, _)| group.is_of(index)) {
+            rows.push((*group, places.len()..places.len() + range.len()));
+            places.extend(range.clone());
+        }
+        (Self { rows, len: places.len() }, places)
+    }
+
+    /// The unknowns of each experiment that move no other one's output. The only experiment has none: nothing else
+    /// shares the unknowns.
+    pub(crate) fn own(&self) -> Vec<Vec<usize>> {
+        let mut own: Vec<Vec<usize>> = Vec::new();
+        for (group, range) in &self.rows {
+            if let Some(experiment) = group.experiment() {
+                own.resize(own.len().max(experiment + 1), Vec::new());
+                own[experiment].extend(range.clone());
+            }
+        }
+        if own.len() > 1 { own } else { Vec::new() }
     }
 
     /// The group of an unknown, and the unknown's place within it.
     pub(crate) fn at(&self, unknown: usize) -> Option<(Group, usize)> {
-        let found = self.rows.iter().find(|(_, range)| range.contains(&unknown));
-        found.map(|(group, range)| (*group, unknown - range.start))
+        let row = self.rows.partition_point(|(_, range)| range.end <= unknown);
+        self.rows.get(row).map(|(group, range)| (*group, unknown - range.start))
     }
 
     /// Whether the output is linear in an unknown while all others are kept. That is exact without loops and without an
@@ -216,6 +227,21 @@ impl Group {
             }
             State { experiment } => freedom.states && point.pasts[experiment].has_unknown_state,
         }
+    }
+
+    /// The experiment whose output alone the group moves.
+    fn experiment(self) -> Option<usize> {
+        match self {
+            Offsets { experiment } | Plays { experiment, .. } | State { experiment } => {
+                Some(experiment)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether the output of an experiment depends on the group.
+    fn is_of(self, experiment: usize) -> bool {
+        self.experiment().is_none_or(|own| own == experiment)
     }
 
     /// The values of the group in a point.

@@ -71,9 +71,9 @@ impl<'a> Base<'a> {
         free.retain(|&unknown| table.at(unknown).is_some_and(|(group, _)| takes(group)));
         let gram = &linearization.gram;
         let scale: Vec<f64> =
-            free.iter().map(|&i| gram[(i, i)].sqrt().max(f64::MIN_POSITIVE)).collect();
+            free.iter().map(|&i| gram.get(i, i).sqrt().max(f64::MIN_POSITIVE)).collect();
         let scaled = Matrix::from_fn(free.len(), free.len(), |i, j| {
-            gram[(free[i], free[j])] / (scale[i] * scale[j])
+            gram.get(free[i], free[j]) / (scale[i] * scale[j])
         });
         let (values, vectors) = descending_eigen(scaled);
         let largest = values.iter().copied().fold(0.0, f64::max);

@@ -131,9 +131,10 @@ impl Base<'_> {
         let n = own.len();
         let unknown = |i: usize| inserted.start + own[i];
         let step = |i: usize| steps[own[i]];
-        let cross = Matrix::from_fn(known.len(), n, |i, j| gram[(known[i], unknown(j))] * step(j));
+        let cross =
+            Matrix::from_fn(known.len(), n, |i, j| gram.get(known[i], unknown(j)) * step(j));
         let squares =
-            Matrix::from_fn(n, n, |i, j| gram[(unknown(i), unknown(j))] * step(i) * step(j));
+            Matrix::from_fn(n, n, |i, j| gram.get(unknown(i), unknown(j)) * step(i) * step(j));
         let with_residual = DVector::from_fn(n, |i, _| descent[unknown(i)] * step(i));
         Ok(Some(self.projected(&cross, &squares, with_residual)))
     }

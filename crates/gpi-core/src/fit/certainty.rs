@@ -15,16 +15,17 @@
 
 use super::gather::gather;
 use super::minimize::{FitOptions, Fitted};
-use super::problem::{Estimation, only, scored};
+use super::problem::{Estimation, scored};
 use super::representatives::{representatives, streamed};
 use crate::chain::point::Point;
 use crate::chain::stream::Stream;
-use crate::linear::NormalEquations;
+use crate::linear::{Arrow, NormalEquations};
 use crate::optimize::LeastSquares;
 use crate::uncertainty::covariance::{Uncertainty, descending_eigen};
 use crate::uncertainty::noise_model::NoiseModel;
 use crate::uncertainty::settings::UncertaintySettings;
 use crate::{Error, Matrix, Record};
+use nalgebra::DVector;
 
 /// The uncertainty of a fit that left these residuals.
 ///
@@ -49,7 +50,8 @@ pub(crate) fn uncertainty(
     // a weight at zero is not estimated, it is known to be on its bound
     let free = problem.bounds(point).free();
     let samples = (record.scored() * record.outputs().len()) as f64;
-    let gram = &linearization.gram * curvature;
+    let root = DVector::from_element(linearization.gram.len(), curvature.sqrt().recip());
+    let gram = linearization.gram.scaled(&root);
     Ok(Uncertainty::new(settings.covariance, &gram, &scores, &free, samples, linearization.cost))
 }
 
@@ -59,28 +61,27 @@ fn score_gram(
     problem: &Estimation,
     noise: &NoiseModel,
     check: &mut dyn FnMut() -> Result<(), Error>,
-) -> Result<Matrix, Error> {
+) -> Result<Arrow, Error> {
     let Estimation { record, freedom, loss, table } = problem;
     let outputs = loss.scales.len();
     // the square root of the innovations' covariance mixes the outputs' filtered rows
     let (values, vectors) = descending_eigen(noise.innovations.clone());
     let root = vectors * Matrix::from_diagonal(&values.map(|value| value.max(0.0).sqrt()));
-    let mut equations = NormalEquations::zeros(table.len, 1);
+    let mut scores = Arrow::zeros(table.len, table.own());
     let few = representatives(point, record, table.len);
     for (index, experiment, memory) in streamed(few.as_ref(), record) {
-        let stream = Stream::new(point, table, freedom.derivatives, experiment, index)?;
-        let own = table.of_experiment(index);
-        let mut part = NormalEquations::zeros(own.len(), 1);
+        let (own, places) = table.of_experiment(index);
+        let stream = Stream::new(point, &own, freedom.derivatives, experiment, index)?;
+        let mut part = NormalEquations::zeros(own.len, 1);
         let mut past: Vec<Matrix> =
-            noise.coefficients.iter().map(|a| Matrix::zeros(own.len(), a.len())).collect();
+            noise.coefficients.iter().map(|a| Matrix::zeros(own.len, a.len())).collect();
         gather(stream.with_memory(memory), check, |rows| {
             let mut filtered = Vec::new();
             for (output, regressor) in rows.regressors.into_iter().enumerate() {
-                let regressor = only(regressor, &own);
                 let (filter, past) = (&noise.coefficients[output], &mut past[output]);
                 let order = filter.len();
                 let count = regressor.ncols();
-                let mut extended = Matrix::zeros(own.len(), order + count);
+                let mut extended = Matrix::zeros(own.len, order + count);
                 extended.columns_mut(0, order).copy_from(past);
                 for k in 0..count {
                     let mut row = regressor.column(k).into_owned();
@@ -102,10 +103,10 @@ fn score_gram(
                 part.add(&sum, &none);
             }
         })?;
-        equations.add_part(&part, &own);
+        scores.add_part(&part.gram, &places);
     }
-    if let Some(few) = few {
-        few.extend(&mut equations.gram, table, record);
-    }
-    Ok(equations.gram)
+    let Some(few) = few else { return Ok(scores) };
+    let mut scores = scores.to_dense();
+    few.extend(&mut scores, table, record);
+    Ok(scores.into())
 }

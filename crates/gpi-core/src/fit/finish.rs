@@ -20,7 +20,7 @@ use crate::progress::{Progress, report};
 use crate::uncertainty::Bands;
 use crate::uncertainty::covariance::Uncertainty;
 use crate::uncertainty::noise_floor::NoiseFloor;
-use crate::{Error, Matrix, Record};
+use crate::{Error, Record};
 
 impl Refined {
     /// The covariance of the estimates, and the number of parameters that the information criterion counts.
@@ -98,21 +98,17 @@ impl Refined {
             unit: described[i].0.clone(),
             zero_is_absence: described[i].1,
         };
-        let covariance = Matrix::from_fn(estimated.len(), estimated.len(), |i, j| {
-            uncertainty.covariance[(estimated[i], estimated[j])]
-        });
         Ok(Refinement {
             status,
             history: history.iter().map(|cost| (cost / values).sqrt()).collect(),
             parameters: estimated.iter().map(parameter).collect(),
-            covariance,
             undetermined: uncertainty.undetermined(&names),
             residual_rms: residual_rms(&residuals, record),
             noise_floor: NoiseFloor::estimate(record, &residuals),
             residuals,
             outliers: self.outliers,
             robust: self.robust,
-            bands: Bands { point, table, uncertainty },
+            bands: Bands { point, table, estimated, uncertainty },
         })
     }
 }

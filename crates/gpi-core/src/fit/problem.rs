@@ -26,7 +26,7 @@ use crate::chain::adjoint::descent;
 use crate::chain::point::{Freedom, Point};
 use crate::chain::stream::{Rows, Stream};
 use crate::chain::table::Table;
-use crate::linear::NormalEquations;
+use crate::linear::{Arrow, NormalEquations};
 use crate::optimize::{Bounds, LeastSquares, Linearization, Loss};
 use crate::{Error, Matrix, Record};
 use nalgebra::{DMatrixView, DVector};
@@ -62,31 +62,28 @@ impl LeastSquares for Estimation<'_> {
         check: &mut dyn FnMut() -> Result<(), Error>,
     ) -> Result<Linearization, Error> {
         let few = representatives(point, self.record, self.table.len);
-        let mut equations = NormalEquations::zeros(self.table.len, 1);
+        let mut gram = Arrow::zeros(self.table.len, self.table.own());
+        let mut descent = DVector::zeros(self.table.len);
         let mut cost = 0.0;
         for (index, experiment, memory) in streamed(few.as_ref(), self.record) {
             check()?;
+            let (own, places) = self.table.of_experiment(index);
             let wanted = self.freedom.derivatives;
-            let stream = Stream::new(point, &self.table, wanted, experiment, index)?;
-            let own = self.table.of_experiment(index);
-            let mut part = NormalEquations::zeros(own.len(), 1);
+            let stream = Stream::new(point, &own, wanted, experiment, index)?;
+            let mut part = NormalEquations::zeros(own.len, 1);
             gather(stream.with_memory(memory), check, |rows| {
-                cost += add(&mut part, rows, &own, self.loss);
+                cost += add(&mut part, rows, self.loss);
             })?;
-            equations.add_part(&part, &own);
+            gram.add_part(&part.gram, &places);
+            places.iter().zip(part.rhs.iter()).for_each(|(&i, value)| descent[i] += value);
         }
-        let NormalEquations { mut gram, rhs, .. } = equations;
         let Some(few) = few else {
-            return Ok(Linearization {
-                gram,
-                descent: rhs.column(0).into_owned(),
-                cost,
-                age: None,
-            });
+            return Ok(Linearization { gram, descent, cost, age: None });
         };
+        let mut gram = gram.to_dense();
         few.extend(&mut gram, &self.table, self.record);
         let (descent, cost) = self.gradient(point, check)?;
-        Ok(Linearization { gram, descent, cost, age: Some(0) })
+        Ok(Linearization { gram: gram.into(), descent, cost, age: Some(0) })
     }
 
     fn gradient(
@@ -136,11 +133,10 @@ pub(crate) fn residual_rms(residuals: &[Matrix], record: &Record) -> Vec<f64> {
     (0..record.outputs().len()).map(rms).collect()
 }
 
-/// Adds a block of rows to the equations of the unknowns `own`; returns its cost.
-fn add(equations: &mut NormalEquations, rows: Rows, own: &[usize], loss: &Loss) -> f64 {
+/// Adds a block of rows to the equations; returns its cost.
+fn add(equations: &mut NormalEquations, rows: Rows, loss: &Loss) -> f64 {
     let mut cost = 0.0;
-    for (output, regressor) in rows.regressors.into_iter().enumerate() {
-        let mut regressor = only(regressor, own);
+    for (output, mut regressor) in rows.regressors.into_iter().enumerate() {
         let mut target = rows.residuals.row(output).into_owned();
         for (mut row, value) in regressor.column_iter_mut().zip(target.iter_mut()) {
             let (weight, own) = loss.of(output, *value);
@@ -152,12 +148,6 @@ fn add(equations: &mut NormalEquations, rows: Rows, own: &[usize], loss: &Loss) 
         equations.add(&regressor, &target);
     }
     cost
-}
-
-/// The rows of some unknowns, all that are not zero: for n experiments with unknown initial states of their own, the
-/// products of all unknowns take up to n^2 times as long as those of each experiment's own.
-pub(super) fn only(regressor: Matrix, own: &[usize]) -> Matrix {
-    if own.len() == regressor.nrows() { regressor } else { regressor.select_rows(own) }
 }
 
 #[cfg(test)]
@@ -199,7 +189,7 @@ mod tests {
             expected.iter().filter(|value| value.abs() > 1e-6).count() > expected.len() * 9 / 10
         );
         for (i, (found, expected)) in found.iter().zip(expected.iter()).enumerate() {
-            let scale = (all.gram[(i, i)] * all.cost).sqrt();
+            let scale = (all.gram.get(i, i) * all.cost).sqrt();
             assert!((found - expected).abs() <= 1e-11 * scale, "{i}: {found} {expected}");
         }
     }

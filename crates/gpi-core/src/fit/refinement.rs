@@ -52,8 +52,6 @@ pub struct Refinement {
     pub history: Vec<f64>,
     /// All that was estimated, with standard deviations from the residual's own autocorrelation.
     pub parameters: Vec<Parameter>,
-    /// Covariance of these parameters.
-    pub covariance: Matrix,
     /// Unidentifiable parameters: names and shares of each combination that the data do not determine, largest first.
     pub undetermined: Vec<Vec<(String, f64)>>,
     /// Root mean square residual of each output on the training data.
@@ -72,6 +70,12 @@ pub struct Refinement {
 }
 
 impl Refinement {
+    /// Covariance of the parameters, (parameters, parameters), in the products of their units. It is made from its parts, so
+    /// that many experiments with unknown initial states of their own need its memory only if it is asked for.
+    pub fn covariance(&self) -> Matrix {
+        self.bands.uncertainty.covariance(&self.bands.estimated)
+    }
+
     /// What the file of the refined model keeps: see [`Estimates`].
     ///
     /// # Errors

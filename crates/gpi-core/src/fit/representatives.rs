@@ -168,7 +168,7 @@ mod tests {
         let loss = Loss::squares(2);
         let problem = Estimation::new(point, record, FREEDOM, &loss);
         let all = problem.linearize(point, &mut || Ok(())).unwrap();
-        (all.gram, problem.table)
+        (all.gram.to_dense(), problem.table)
     }
 
     #[test]

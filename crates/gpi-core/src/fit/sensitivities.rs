@@ -80,13 +80,12 @@ pub fn sensitivities(
     let problem = Estimation::new(&point, &prepared.record, freedom, &loss);
     let found = problem.linearize(&point, &mut check)?;
     let (names, values) = names_and_values(&point, &table, &prepared);
-    let gram = &found.gram;
     Ok(Sensitivities {
         names: kept.iter().map(|&i| names[i].clone()).collect(),
         values: kept.iter().map(|&i| values[i]).collect(),
         jacobians,
         gradient: DVector::from_fn(kept.len(), |i, _| -found.descent[kept[i]]),
-        hessian: Matrix::from_fn(kept.len(), kept.len(), |i, j| gram[(kept[i], kept[j])]),
+        hessian: found.gram.select(&kept),
         cost: found.cost,
     })
 }

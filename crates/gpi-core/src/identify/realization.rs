@@ -127,7 +127,7 @@ pub(crate) fn refit(record: &Record, system: StateSpace) -> Result<Refit, Error>
     let solutions: Vec<DVector<f64>> = (0..outputs)
         .map(|output| {
             let rhs = equations.rhs.column(output).into_owned();
-            bounded(&equations.gram, &rhs, &-&free, &free)
+            bounded(&equations.gram.clone().into(), &rhs, &-&free, &free)
         })
         .collect();
     let x = Matrix::from_columns(&solutions);

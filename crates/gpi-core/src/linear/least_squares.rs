@@ -1,6 +1,6 @@
 //! Least squares from normal equations, with bounds on the unknowns.
 
-use super::decompose::solve_positive;
+use super::arrow::Arrow;
 use crate::Matrix;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, MatMut, MatRef, Par};
@@ -18,9 +18,6 @@ const SLACK: f64 = 1e-12;
 
 /// Exchanges of whole sets of unknowns between free and held before single ones are exchanged: three to eight are usual.
 const EXCHANGES: usize = 20;
-
-/// With more unknowns than this, faer's blocked Cholesky decomposition is faster, at the cost of megabytes of workspace.
-const LARGE: usize = 300;
 
 /// The normal equations `gram x = rhs` of a least squares problem, accumulated without storing its regressor.
 #[derive(Clone, Debug)]
@@ -50,21 +47,6 @@ impl NormalEquations {
         for (sum, row) in self.squares.iter_mut().zip(targets.row_iter()) {
             *sum += row.norm_squared();
         }
-    }
-
-    /// Adds the equations of a part of the unknowns, `places` ascending.
-    pub(crate) fn add_part(&mut self, part: &Self, places: &[usize]) {
-        for (j, &column) in places.iter().enumerate() {
-            for (i, &row) in places.iter().enumerate() {
-                self.gram[(row, column)] += part.gram[(i, j)];
-            }
-        }
-        for (i, &row) in places.iter().enumerate() {
-            for target in 0..self.rhs.ncols() {
-                self.rhs[(row, target)] += part.rhs[(i, target)];
-            }
-        }
-        self.squares += &part.squares;
     }
 
     /// Sum of squared residuals of each target at `x`.
@@ -104,13 +86,10 @@ fn add_squares(gram: &mut Matrix, factor: &Matrix) {
 ///
 /// Bounds may be infinite. The unknowns are scaled first, so that the diagonal of the Gram matrix is one. Unidentifiable
 /// combinations of unknowns are close to zero.
-pub(crate) fn bounded(gram: &Matrix, rhs: &Vector, lower: &Vector, upper: &Vector) -> Vector {
+pub(crate) fn bounded(gram: &Arrow, rhs: &Vector, lower: &Vector, upper: &Vector) -> Vector {
     let scale = gram.diagonal().map(|square| if square > 0.0 { square.sqrt() } else { 1.0 });
-    let n = rhs.len();
-    let mut scaled = Matrix::from_fn(n, n, |i, j| gram[(i, j)] / (scale[i] * scale[j]));
-    for i in 0..n {
-        scaled[(i, i)] += REGULARIZATION;
-    }
+    let mut scaled = gram.scaled(&scale);
+    scaled.set_diagonal(&scaled.diagonal().add_scalar(REGULARIZATION));
     let target = rhs.component_div(&scale);
     let (lower, upper) = (lower.component_mul(&scale), upper.component_mul(&scale));
     let found = pivoted(&scaled, &target, &lower, &upper);
@@ -118,14 +97,14 @@ pub(crate) fn bounded(gram: &Matrix, rhs: &Vector, lower: &Vector, upper: &Vecto
 }
 
 /// The minimum by exchanges of whole sets; `None` where they do not end.
-fn pivoted(gram: &Matrix, rhs: &Vector, lower: &Vector, upper: &Vector) -> Option<Vector> {
+fn pivoted(gram: &Arrow, rhs: &Vector, lower: &Vector, upper: &Vector) -> Option<Vector> {
     let n = rhs.len();
     let mut x = DVector::zeros(n);
     let mut passive: Vec<bool> = (0..n).map(|i| lower[i] < upper[i]).collect();
     let slack = SLACK * rhs.amax();
     for _ in 0..EXCHANGES {
         x = passive_solution(gram, rhs, &x, &passive);
-        let descent = rhs - gram * &x;
+        let descent = rhs - gram.times(&x);
         let mut changed = false;
         for i in 0..n {
             if passive[i] && (x[i] < lower[i] || x[i] > upper[i]) {
@@ -153,7 +132,7 @@ fn inward(descent: f64, x: f64, lower: f64, upper: f64) -> f64 {
     }
 }
 
-fn active_set(gram: &Matrix, rhs: &Vector, lower: &Vector, upper: &Vector) -> Vector {
+fn active_set(gram: &Arrow, rhs: &Vector, lower: &Vector, upper: &Vector) -> Vector {
     let n = rhs.len();
     let mut x = DVector::zeros(n);
     // all unknowns are free at first; those beyond a bound are fixed to it one by one
@@ -178,7 +157,7 @@ fn active_set(gram: &Matrix, rhs: &Vector, lower: &Vector, upper: &Vector) -> Ve
             x[i] = bound;
             passive[i] = false;
         }
-        let descent = rhs - gram * &x;
+        let descent = rhs - gram.times(&x);
         let inward = |i: usize| inward(descent[i], x[i], lower[i], upper[i]);
         let entering = (0..n).filter(|&i| !passive[i] && inward(i) > slack);
         match entering.max_by(|&i, &j| inward(i).total_cmp(&inward(j))) {
@@ -190,24 +169,12 @@ fn active_set(gram: &Matrix, rhs: &Vector, lower: &Vector, upper: &Vector) -> Ve
 }
 
 /// The minimum over the passive (free) unknowns, with the others fixed at `x`.
-fn passive_solution(gram: &Matrix, rhs: &Vector, x: &Vector, passive: &[bool]) -> Vector {
-    let free: Vec<usize> = (0..x.len()).filter(|&i| passive[i]).collect();
+fn passive_solution(gram: &Arrow, rhs: &Vector, x: &Vector, passive: &[bool]) -> Vector {
     let held = DVector::from_fn(x.len(), |i, _| if passive[i] { 0.0 } else { x[i] });
-    let remaining = rhs - gram * held;
-    let reduced = Matrix::from_fn(free.len(), free.len(), |i, j| gram[(free[i], free[j])]);
-    let target = DVector::from_fn(free.len(), |i, _| remaining[free[i]]);
-    let mut solution = x.clone();
-    let values = if free.len() > LARGE {
-        solve_positive(&reduced, &target)
-    } else {
-        reduced.cholesky().map(|factor| factor.solve(&target))
-    };
-    if let Some(values) = values {
-        for (&i, value) in free.iter().zip(values.iter()) {
-            solution[i] = *value;
-        }
+    match gram.solve(&(rhs - gram.times(&held)), passive) {
+        Some(found) => held + found,
+        None => x.clone(),
     }
-    solution
 }
 
 #[cfg(test)]
@@ -218,7 +185,8 @@ mod tests {
     fn bounds_hold_and_the_conditions_of_optimality_too() {
         let a = Matrix::from_fn(30, 5, |i, j| ((i * (j + 2)) as f64 * 0.61).sin() + 0.3);
         let b = DVector::from_fn(30, |i, _| (i as f64 * 0.37).cos() - 0.4);
-        let (gram, rhs) = (a.tr_mul(&a), a.tr_mul(&b));
+        let (dense, rhs) = (a.tr_mul(&a), a.tr_mul(&b));
+        let gram = Arrow::from(dense.clone());
         let lower = DVector::from_vec(vec![0.0, 0.0, f64::NEG_INFINITY, 0.0, -0.1]);
         let free = DVector::from_element(5, f64::INFINITY);
         let loose = bounded(&gram, &rhs, &lower, &free);
@@ -226,7 +194,7 @@ mod tests {
         let largest = loose.imax();
         upper[largest] = 0.5 * loose[largest];
         let x = bounded(&gram, &rhs, &lower, &upper);
-        let gradient = &gram * &x - &rhs;
+        let gradient = &dense * &x - &rhs;
         for i in 0..5 {
             assert!(x[i] >= lower[i] && x[i] <= upper[i]);
             if x[i] == lower[i] {

@@ -1,5 +1,6 @@
 //! The linear dynamics G: estimation of its impulse response, realization as a state space, simulation, and inversion.
 
+mod arrow;
 mod decompose;
 mod dot;
 mod era;
@@ -21,6 +22,7 @@ pub use state_space::StateSpace;
 pub use transfer_function::TransferFunction;
 pub use zero_order_hold::zero_order_hold;
 
+pub(crate) use arrow::{Arrow, Group as ArrowGroup};
 pub(crate) use decompose::symmetric_eigen;
 pub(crate) use dot::dot;
 pub(crate) use era::Hankel;

@@ -64,9 +64,11 @@ pub(crate) fn levenberg_marquardt<L: LeastSquares>(
         let bounds = problem.bounds(&point);
         let mut gram = current.gram.clone();
         let is_damped = |i: &usize| current.is_approximate() || !problem.is_linear(*i);
-        for i in (0..gram.nrows()).filter(is_damped) {
-            gram[(i, i)] *= 1.0 + damping;
+        let mut diagonal = gram.diagonal();
+        for i in (0..gram.len()).filter(is_damped) {
+            diagonal[i] *= 1.0 + damping;
         }
+        gram.set_diagonal(&diagonal);
         let step = bounded(&gram, &current.descent, &bounds.lower, &bounds.upper);
         let predicted = current.predicted(&step);
         // also where the bounds leave no way to go, or all is explained to the last digit

@@ -1,6 +1,6 @@
 //! The quadratic model of a cost.
 
-use crate::Matrix;
+use crate::linear::Arrow;
 use nalgebra::DVector;
 
 /// Around a point x, `cost(x + s) = cost - 2 descent' s + s' gram s`, with `gram = J' W J` and
@@ -8,7 +8,7 @@ use nalgebra::DVector;
 #[derive(Clone, Debug)]
 pub(crate) struct Linearization {
     /// The Gauss-Newton approximation of half the cost's Hessian matrix.
-    pub gram: Matrix,
+    pub gram: Arrow,
     /// Half the steepest descent of the cost.
     pub descent: DVector<f64>,
     pub cost: f64,
@@ -29,7 +29,7 @@ impl Linearization {
 
     /// By how much the model lets the cost fall with a step.
     pub(super) fn predicted(&self, step: &DVector<f64>) -> f64 {
-        2.0 * step.dot(&self.descent) - (&self.gram * step).dot(step)
+        2.0 * step.dot(&self.descent) - self.gram.times(step).dot(step)
     }
 
     /// The model after a step to a point of known gradient and cost: the curvature is kept, and along the step it
@@ -44,7 +44,7 @@ impl Linearization {
         (descent, cost): (DVector<f64>, f64),
         least: f64,
     ) -> Self {
-        let mut gram = self.gram.clone();
+        let mut gram = self.gram.to_dense();
         let change = &self.descent - &descent;
         let expected = &gram * step;
         let (found, power) = (step.dot(&change), step.dot(&expected));
@@ -55,6 +55,6 @@ impl Linearization {
             gram.ger(-1.0 / power, &expected, &expected, 1.0);
             gram.ger(1.0 / step.dot(&change), &change, &change, 1.0);
         }
-        Self { gram, descent, cost, age: self.age.map(|age| age + 1) }
+        Self { gram: gram.into(), descent, cost, age: self.age.map(|age| age + 1) }
     }
 }

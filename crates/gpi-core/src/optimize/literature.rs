@@ -50,7 +50,7 @@ impl LeastSquares for Problem {
         let weights = residuals.map(|e| self.loss.of(0, e).0);
         let weighted = Matrix::from_diagonal(&weights) * &jacobian;
         Ok(Linearization {
-            gram: jacobian.tr_mul(&weighted),
+            gram: jacobian.tr_mul(&weighted).into(),
             descent: weighted.tr_mul(&residuals),
             cost: self.evaluate(point)?,
             age: self.approximate.then_some(0),
@@ -180,7 +180,7 @@ fn an_interruption_ends_the_work() {
         fn linearize(&self, (): &(), check: Check<Stopped>) -> Result<Linearization, Stopped> {
             check()?;
             let (gram, descent) = (Matrix::identity(1, 1), DVector::from_element(1, 1.0));
-            Ok(Linearization { gram, descent, cost: 2.0, age: None })
+            Ok(Linearization { gram: gram.into(), descent, cost: 2.0, age: None })
         }
         fn bounds(&self, (): &()) -> Bounds {
             Bounds::none(1)

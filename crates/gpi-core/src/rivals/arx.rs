@@ -102,7 +102,7 @@ fn best(record: &Record, output: usize, policy: &RivalPolicy) -> Option<Equation
             let gram = Matrix::from_fn(unknowns, unknowns, |i, j| sums.gram[(kept[i], kept[j])]);
             let right = DVector::from_fn(unknowns, |i, _| sums.rhs[(kept[i], 0)]);
             let free = DVector::from_element(unknowns, f64::INFINITY);
-            let x = bounded(&gram, &right, &-&free, &free);
+            let x = bounded(&gram.into(), &right, &-&free, &free);
             let equation = Equation {
                 output,
                 offset: x[0],

@@ -168,7 +168,7 @@ fn solve(sums: &NormalEquations, size: usize, ridge: f64) -> Matrix {
         let product = sums.gram[(i + 1, j + 1)] - count * mean(i + 1) * mean(j + 1);
         if i == j { product * (1.0 + ridge) } else { product }
     };
-    let gram = Matrix::from_fn(size, size, covariance);
+    let gram = Matrix::from_fn(size, size, covariance).into();
     let free = DVector::from_element(size, f64::INFINITY);
     let mut x = Matrix::zeros(size + 1, sums.rhs.ncols());
     for target in 0..sums.rhs.ncols() {

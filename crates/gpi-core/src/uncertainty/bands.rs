@@ -35,6 +35,8 @@ pub struct ResponseDeviation {
 pub struct Bands {
     pub(crate) point: Point,
     pub(crate) table: Table,
+    /// The unknowns that are not held.
+    pub(crate) estimated: Vec<usize>,
     pub(crate) uncertainty: Uncertainty,
 }
 

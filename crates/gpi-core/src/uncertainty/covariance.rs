@@ -2,40 +2,66 @@
 //!
 //! With H the Gram matrix of the sensitivities and M the score's covariance (both (unknowns, unknowns), see
 //! `fit/certainty.rs`) the covariance of the estimate is `C = H^-1 M H^-1`. Units must not decide what is identifiable, so
-//! rows and columns are scaled by `s_i = sqrt(H_ii)` first: `H_ij / (s_i s_j) = V L V'` has a unit diagonal. Directions V_k
-//! with `L_k <= 1e-12 L_max` are unidentifiable: they are left out of the inverse and kept apart, and the deviation of
-//! every parameter that takes part in one is NaN. Unknowns at a bound are held and have variance zero.
+//! rows and columns are scaled by `sqrt(H_ii)` first. The own unknowns of each experiment are eliminated ([`super::elimination`]):
+//! there are as many of them as experiments, and the shared unknowns are what everybody asks for. With `d` the error of
+//! the shared unknowns and `d_e` that of the own unknowns of experiment e,
 //!
-//! C is computed as `F F'`, `F = V L^(-1/2) Q D^(1/2)` with `L^(-1/2) V' M V L^(-1/2) = Q D Q'`: products of inverses would lose
-//! the small variances of combinations of parameters of which each alone is hardly determined.
+//! ```text
+//! cov(d, d)     = F F'                                     F (shared, directions)
+//! d_e           = G_e d + n_e                              G_e (own, shared), n_e the error if d were zero
+//! cov(n_e, d)   = P_e,   cov(n_e, n_e) = W_e,   cov(n_e, n_f) = 0 for two experiments
+//! ```
+//!
+//! so that the memory is proportional to the number of experiments; the dense matrix C is made when it is asked for. Unknowns
+//! at a bound are held and have variance zero. Unidentifiable directions are kept apart, and the deviation of every
+//! parameter that takes part in one is NaN.
 //!
 //! The number of samples of white noise that the fit uses up is `tr(H^-1 M) / sigma^2`, sigma^2 the residual's variance:
 //! the number of unknowns for white noise, since M is then `sigma^2 H`, and more for slow noise (K. Takeuchi, 1976).
 //!
 //! A function f of the unknowns has the variance `g' C g`, g its gradient (delta method). With the axes
 //! `d_k = F U_k` of `C = F F'`, U the principal axes of F with rows of unit length, it is the sum of squares of the derivatives
-//! along them: `sum_k ((f(theta + h d_k) - f(theta - h d_k)) / (2 h))^2`.
+//! along them: `sum_k ((f(theta + h d_k) - f(theta - h d_k)) / (2 h))^2`. For functions of the shared unknowns and of means
+//! over the experiments F has, for the own unknowns, the rows `G_e F` and one more column for each of their places, with the
+//! entries `sqrt(W_e,kk / E)` for E experiments: what each experiment adds to a mean over all of them.
 
+use super::elimination::{Eliminated, Elimination};
 use super::settings::CovarianceSettings;
-use crate::linear::symmetric_eigen;
+use crate::linear::{Arrow, ArrowGroup, symmetric_eigen};
 use crate::{Error, Matrix};
 use nalgebra::DVector;
+
+/// Shares of unknowns in a direction, of unit length after scaling every unknown by its column's norm.
+pub(crate) type Direction = Vec<(usize, f64)>;
 
 /// Covariance of the unknowns of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Uncertainty {
-    /// (unknowns, unknowns); zero for those that are held.
-    pub covariance: Matrix,
-    /// F, (unknowns, directions), with the covariance F F'.
+    /// How many unknowns there are.
+    unknowns: usize,
+    /// The shared ones that are free, and F, (shared, directions).
+    shared: Vec<usize>,
     factor: Matrix,
-    /// Unidentifiable directions, (unknowns, directions), of unit length after scaling
-    /// every unknown by its column's norm.
-    pub open: Matrix,
+    groups: Vec<Own>,
+    /// Unidentifiable directions.
+    pub open: Vec<Direction>,
     /// Parameters that the fit has used up, counted in samples of white noise: `tr(H^-1 M) / variance`.
     pub used: f64,
     /// Parameters that are free: neither held nor at a bound.
     pub estimated: usize,
     settings: CovarianceSettings,
+}
+
+/// The errors of the own unknowns of an experiment.
+#[derive(Clone, Debug, PartialEq)]
+struct Own {
+    /// Those that are free.
+    unknowns: Vec<usize>,
+    /// G_e and P_e, (own, shared).
+    gain: Matrix,
+    with_shared: Matrix,
+    /// W_e, (own, own).
+    covariance: Matrix,
 }
 
 impl Uncertainty {
@@ -44,70 +70,125 @@ impl Uncertainty {
     /// so many `samples`.
     pub(crate) fn new(
         settings: CovarianceSettings,
-        gram: &Matrix,
-        scores: &Matrix,
+        gram: &Arrow,
+        scores: &Arrow,
         free: &[usize],
         samples: f64,
         cost: f64,
     ) -> Self {
-        let unknowns = gram.nrows();
-        let reduce = |matrix: &Matrix| {
-            Matrix::from_fn(free.len(), free.len(), |i, j| matrix[(free[i], free[j])])
-        };
-        let (gram, scores) = (reduce(gram), reduce(scores));
+        let unknowns = gram.len();
+        let (gram, scores) = (gram.restricted(free), scores.restricted(free));
         let scale = gram.diagonal().map(|square| if square > 0.0 { square.sqrt() } else { 1.0 });
-        let scaled = |m: &Matrix| {
-            Matrix::from_fn(free.len(), free.len(), |i, j| m[(i, j)] / (scale[i] * scale[j]))
+        let (gram, scores) = (gram.scaled(&scale), scores.scaled(&scale));
+        let Elimination { factor, groups, open, used } =
+            Elimination::new(&gram, &scores, settings.identifiable);
+        let names = |places: &[usize]| -> Vec<usize> { places.iter().map(|&i| free[i]).collect() };
+        let (shared, _) = gram.shared();
+        let scaled = |matrix: Matrix, rows: &[usize], columns: Option<&[usize]>, power: i32| {
+            let by = |i: usize, j: usize| {
+                scale[rows[i]] * columns.map_or(1.0, |columns| scale[columns[j]].powi(power))
+            };
+            Matrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] / by(i, j))
         };
-        let (values, vectors) = descending_eigen(scaled(&gram));
-        let largest = values.iter().copied().fold(0.0, f64::max);
-        let rank =
-            values.iter().take_while(|&&value| value > settings.identifiable * largest).count();
-        let mut root = vectors.columns(0, rank).into_owned();
-        for (mut column, value) in root.column_iter_mut().zip(values.iter()) {
-            column /= value.sqrt();
+        let own = |(group, found): (&ArrowGroup, Eliminated)| {
+            let own = &group.unknowns[..];
+            Own {
+                unknowns: names(own),
+                gain: scaled(found.gain, own, Some(shared), -1),
+                with_shared: scaled(found.with_shared, own, Some(shared), 1),
+                covariance: scaled(found.covariance, own, Some(own), 1),
+            }
+        };
+        let groups = gram.groups().iter().zip(groups).map(own).collect();
+        let named = |direction: Direction| direction.iter().map(|&(i, x)| (free[i], x)).collect();
+        Self {
+            unknowns,
+            shared: names(shared),
+            factor: scaled(factor, shared, None, 1),
+            groups,
+            open: open.into_iter().map(named).collect(),
+            used: used * samples / cost.max(f64::MIN_POSITIVE),
+            estimated: free.len(),
+            settings,
         }
-        let (spread, turned) = descending_eigen(root.transpose() * scaled(&scores) * &root);
-        let used = spread.sum() * samples / cost.max(f64::MIN_POSITIVE);
-        let mut reduced = root * turned;
-        for (mut column, spread) in reduced.column_iter_mut().zip(spread.iter()) {
-            column *= spread.max(0.0).sqrt();
-        }
-        let mut factor = Matrix::zeros(unknowns, rank);
-        for (i, &row) in free.iter().enumerate() {
-            factor.row_mut(row).copy_from(&(reduced.row(i) / scale[i]));
-        }
-        let covariance = &factor * factor.transpose();
-        let mut open = Matrix::zeros(unknowns, free.len() - rank);
-        for direction in rank..free.len() {
-            for (i, &row) in free.iter().enumerate() {
-                open[(row, direction - rank)] = vectors[(i, direction)];
+    }
+
+    /// The covariance of some unknowns, in their order; zero for those that are held.
+    pub(crate) fn covariance(&self, unknowns: &[usize]) -> Matrix {
+        let mut wanted = vec![None; self.unknowns];
+        unknowns.iter().enumerate().for_each(|(at, &i)| wanted[i] = Some(at));
+        let shared = &self.factor * self.factor.transpose();
+        let mut covariance = Matrix::zeros(unknowns.len(), unknowns.len());
+        let mut put = |rows: &[usize], columns: &[usize], values: &Matrix| {
+            for (j, &column) in columns.iter().enumerate() {
+                for (i, &row) in rows.iter().enumerate() {
+                    if let (Some(row), Some(column)) = (wanted[row], wanted[column]) {
+                        covariance[(row, column)] = values[(i, j)];
+                        covariance[(column, row)] = values[(i, j)];
+                    }
+                }
+            }
+        };
+        put(&self.shared, &self.shared, &shared);
+        for (place, one) in self.groups.iter().enumerate() {
+            let with_shared = &one.gain * &shared + &one.with_shared;
+            put(&one.unknowns, &self.shared, &with_shared);
+            put(&one.unknowns, &one.unknowns, &one.whole(&shared));
+            for other in &self.groups[..place] {
+                let between = &with_shared * other.gain.transpose()
+                    + &one.gain * other.with_shared.transpose();
+                put(&one.unknowns, &other.unknowns, &between);
             }
         }
-        Self { covariance, factor, open, used, estimated: free.len(), settings }
+        covariance
     }
 
     /// Standard deviations of the unknowns; NaN where an unidentifiable direction takes part.
     pub(crate) fn deviations(&self) -> DVector<f64> {
-        DVector::from_fn(self.covariance.nrows(), |i, _| {
-            let open = self.open.row(i).amax() > self.settings.share;
-            if open { f64::NAN } else { self.covariance[(i, i)].max(0.0).sqrt() }
-        })
+        let shared = &self.factor * self.factor.transpose();
+        let mut variances = DVector::zeros(self.unknowns);
+        let mut put = |unknowns: &[usize], values: DVector<f64>| {
+            unknowns.iter().zip(values.iter()).for_each(|(&i, value)| variances[i] = *value);
+        };
+        put(&self.shared, shared.diagonal());
+        self.groups.iter().for_each(|own| put(&own.unknowns, own.whole(&shared).diagonal()));
+        let mut deviations = variances.map(|square: f64| square.max(0.0).sqrt());
+        for &(unknown, share) in self.open.iter().flatten() {
+            if share.abs() > self.settings.share {
+                deviations[unknown] = f64::NAN;
+            }
+        }
+        deviations
     }
 
     /// Unidentifiable parameters: names and shares of the unknowns in every such direction, the largest first.
     pub(crate) fn undetermined(&self, names: &[String]) -> Vec<Vec<(String, f64)>> {
-        let direction = |column: nalgebra::DVectorView<f64>| {
-            let mut shares: Vec<_> = names
-                .iter()
-                .cloned()
-                .zip(column.iter().copied())
-                .filter(|(_, s)| s.abs() > self.settings.listed)
-                .collect();
+        let direction = |direction: &Direction| {
+            let listed = direction.iter().filter(|(_, share)| share.abs() > self.settings.listed);
+            let mut shares: Vec<_> = listed.map(|&(i, share)| (names[i].clone(), share)).collect();
             shares.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
             shares
         };
-        self.open.column_iter().map(direction).collect()
+        self.open.iter().map(direction).collect()
+    }
+
+    /// F of all unknowns, (unknowns, directions): see the module's last paragraph.
+    fn whole_factor(&self) -> Matrix {
+        let means = self.groups.iter().map(|own| own.unknowns.len()).max().unwrap_or(0);
+        let directions = self.factor.ncols();
+        let mut whole = Matrix::zeros(self.unknowns, directions + means);
+        for (i, &row) in self.shared.iter().enumerate() {
+            whole.view_mut((row, 0), (1, directions)).copy_from(&self.factor.row(i));
+        }
+        for own in &self.groups {
+            let rows = &own.gain * &self.factor;
+            for (i, &row) in own.unknowns.iter().enumerate() {
+                whole.view_mut((row, 0), (1, directions)).copy_from(&rows.row(i));
+                let variance = own.covariance[(i, i)] / self.groups.len() as f64;
+                whole[(row, directions + i)] = variance.max(0.0).sqrt();
+            }
+        }
+        whole
     }
 
     /// Standard deviations of functions of the point: root of the sum of squares of [`Uncertainty::axes`].
@@ -139,14 +220,18 @@ impl Uncertainty {
         let reach = |value: f64| most * value.abs().max(least * largest);
         // Zero for an unknown that is held: rounding must not move it off its place, such as the
         // threshold zero, on whose two sides the deadzone is another one.
-        let scale = self.covariance.diagonal().map(|square| square.max(0.0).sqrt());
-        let divisor = scale.map(|value| if value > 0.0 { value } else { 1.0 });
-        let mut scaled = self.factor.clone();
+        let factor = self.whole_factor();
+        let lengths = factor.row_iter().map(|row| row.norm());
+        let divisor = DVector::from_iterator(
+            self.unknowns,
+            lengths.map(|value| if value > 0.0 { value } else { 1.0 }),
+        );
+        let mut scaled = factor.clone();
         scaled.column_iter_mut().for_each(|mut column| column.component_div_assign(&divisor));
         // any rotation leaves F F' as it is: rounding of the eigenvectors does no harm
         let (values, vectors) = descending_eigen(scaled.tr_mul(&scaled));
         let along = |(axis, _): (usize, &f64)| {
-            let deviation = &self.factor * vectors.column(axis);
+            let deviation = &factor * vectors.column(axis);
             let parts = deviation.iter().zip(values_of);
             let fraction = parts
                 .filter(|(part, _)| **part != 0.0)
@@ -158,6 +243,14 @@ impl Uncertainty {
             Ok(above.iter().zip(&below).map(change).collect())
         };
         values.iter().enumerate().take_while(|(_, value)| **value > axes).map(along).collect()
+    }
+}
+
+impl Own {
+    /// The covariance of the own unknowns, from that of the shared ones.
+    fn whole(&self, shared: &Matrix) -> Matrix {
+        let cross = &self.with_shared * self.gain.transpose();
+        &self.gain * shared * self.gain.transpose() + &cross + cross.transpose() + &self.covariance
     }
 }
 

@@ -110,7 +110,7 @@ impl Refinement {
     /// Covariance of ``parameters``, (T5) in the theory, shape (parameters, parameters), each in the product of two units.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Ok(from_matrix(py, &self.whole("covariance")?.covariance))
+        Ok(from_matrix(py, &self.whole("covariance")?.covariance()))
     }
 
     /// Unidentifiable parameters: the linear combinations of parameters that the data do not determine.
