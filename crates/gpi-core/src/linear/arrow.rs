@@ -200,41 +200,90 @@ impl Arrow {
         scatter(&of_shared, &self.shared, &mut product);
         product
     }
+}
+
+/// Solves `A x = b` again and again over other sets of free unknowns: a group whose free unknowns have not changed since the
+/// last solution is not eliminated again.
+pub(crate) struct ArrowSolver<'a> {
+    arrow: &'a Arrow,
+    eliminated: Vec<Option<Eliminated>>,
+}
+
+/// A group whose free unknowns are eliminated.
+struct Eliminated {
+    /// The places of the free unknowns in their group.
+    free: Vec<usize>,
+    /// L, (free, free).
+    factor: Matrix,
+    /// W, (free, shared), and `W' W`, (shared, shared).
+    coupling: Matrix,
+    product: Matrix,
+}
+
+impl<'a> ArrowSolver<'a> {
+    pub(crate) fn new(arrow: &'a Arrow) -> Self {
+        Self { arrow, eliminated: arrow.groups.iter().map(|_| None).collect() }
+    }
 
     /// The solution of `A x = b` over some unknowns, with all others at zero; `None` where the matrix of these
     /// unknowns is not positive definite.
-    pub(crate) fn solve(&self, b: &Vector, is_free: &[bool]) -> Option<Vector> {
+    pub(crate) fn solve(&mut self, b: &Vector, is_free: &[bool]) -> Option<Vector> {
+        let Arrow { shared, head, groups, .. } = self.arrow;
         let free = |unknowns: &[usize]| -> Vec<usize> {
             (0..unknowns.len()).filter(|&at| is_free[unknowns[at]]).collect()
         };
-        let shared = free(&self.shared);
-        let mut head = select(&self.head, &shared, &shared);
-        let mut target = DVector::from_fn(shared.len(), |i, _| b[self.shared[shared[i]]]);
-        let mut eliminated = Vec::with_capacity(self.groups.len());
-        for group in &self.groups {
-            let own = free(&group.unknowns);
-            let factor = select(&group.own, &own, &own).cholesky()?.unpack();
-            let mut coupling = select(&group.coupling, &own, &shared);
-            let mut right = DVector::from_fn(own.len(), |i, _| b[group.unknowns[own[i]]]);
-            factor.solve_lower_triangular_mut(&mut coupling).then_some(())?;
-            factor.solve_lower_triangular_mut(&mut right).then_some(())?;
-            head.gemm_tr(-1.0, &coupling, &coupling, 1.0);
-            target.gemv_tr(-1.0, &coupling, &right, 1.0);
-            eliminated.push((group, own, factor, coupling, right));
+        for (group, kept) in groups.iter().zip(&mut self.eliminated) {
+            let free = free(&group.unknowns);
+            if kept.as_ref().is_none_or(|kept| kept.free != free) {
+                *kept = Some(group.eliminate(free)?);
+            }
         }
-        let solution = if head.nrows() > LARGE {
-            solve_positive(&head, &target)?
+        let known = || groups.iter().zip(self.eliminated.iter().flatten());
+        let mut rest = DVector::from_fn(shared.len(), |i, _| b[shared[i]]);
+        let mut right = Vec::with_capacity(groups.len());
+        for (group, Eliminated { free, factor, coupling, .. }) in known() {
+            let mut own = DVector::from_fn(free.len(), |i, _| b[group.unknowns[free[i]]]);
+            factor.solve_lower_triangular_mut(&mut own).then_some(())?;
+            rest.gemv_tr(-1.0, coupling, &own, 1.0);
+            right.push(own);
+        }
+        let at = free(shared);
+        let mut reduced = select(head, &at, &at);
+        if at.len() == shared.len() {
+            known().for_each(|(_, own)| reduced -= &own.product);
         } else {
-            head.cholesky()?.solve(&target)
+            known().for_each(|(_, own)| reduced -= select(&own.product, &at, &at));
+        }
+        let target = rest.select_rows(&at);
+        let solution = if reduced.nrows() > LARGE {
+            solve_positive(&reduced, &target)?
+        } else {
+            reduced.cholesky()?.solve(&target)
         };
+        let mut of_shared = DVector::zeros(shared.len());
+        scatter(&solution, &at, &mut of_shared);
         let mut x = DVector::zeros(b.len());
-        shared.iter().zip(solution.iter()).for_each(|(&at, value)| x[self.shared[at]] = *value);
-        for (group, own, factor, coupling, right) in eliminated {
-            let mut solved = right - coupling * &solution;
-            factor.tr_solve_lower_triangular_mut(&mut solved).then_some(())?;
-            own.iter().zip(solved.iter()).for_each(|(&at, value)| x[group.unknowns[at]] = *value);
+        scatter(&of_shared, shared, &mut x);
+        for ((group, own), mut solved) in known().zip(right) {
+            solved.gemv(-1.0, &own.coupling, &of_shared, 1.0);
+            own.factor.tr_solve_lower_triangular_mut(&mut solved).then_some(())?;
+            own.free
+                .iter()
+                .zip(solved.iter())
+                .for_each(|(&at, value)| x[group.unknowns[at]] = *value);
         }
         Some(x)
+    }
+}
+
+impl Group {
+    /// The elimination of some of the unknowns; `None` where their matrix is not positive definite.
+    fn eliminate(&self, free: Vec<usize>) -> Option<Eliminated> {
+        let factor = select(&self.own, &free, &free).cholesky()?.unpack();
+        let mut coupling = self.coupling.select_rows(&free);
+        factor.solve_lower_triangular_mut(&mut coupling).then_some(())?;
+        let product = coupling.transpose() * &coupling;
+        Some(Eliminated { free, factor, coupling, product })
     }
 }
 
@@ -280,10 +329,11 @@ mod tests {
         let scale = DVector::from_fn(7, |i, _| 1.0 + i as f64);
         let expected = Matrix::from_fn(7, 7, |i, j| dense[(i, j)] / (scale[i] * scale[j]));
         assert!((arrow.scaled(&scale).to_dense() - expected).amax() < 1e-12);
-        let all = arrow.solve(&x, &[true; 7]).unwrap();
+        let mut solver = ArrowSolver::new(&arrow);
+        let all = solver.solve(&x, &[true; 7]).unwrap();
         assert!((&dense * all - &x).amax() < 1e-10);
         let is_free = [true, true, false, true, false, true, true];
-        let some = arrow.solve(&x, &is_free).unwrap();
+        let some = solver.solve(&x, &is_free).unwrap();
         let left = &dense * &some - &x;
         for i in 0..7 {
             assert!(if is_free[i] { left[i].abs() < 1e-10 } else { some[i] == 0.0 }, "{i}");
@@ -312,6 +362,7 @@ mod tests {
     #[test]
     fn what_is_not_positive_definite_has_no_solution() {
         let ones = DVector::from_element(7, 1.0);
-        assert_eq!(Arrow::zeros(7, vec![vec![0, 5]]).solve(&ones, &[true; 7]), None);
+        let zero = Arrow::zeros(7, vec![vec![0, 5]]);
+        assert_eq!(ArrowSolver::new(&zero).solve(&ones, &[true; 7]), None);
     }
 }

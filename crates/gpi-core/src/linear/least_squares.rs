@@ -1,6 +1,6 @@
 //! Least squares from normal equations, with bounds on the unknowns.
 
-use super::arrow::Arrow;
+use super::arrow::{Arrow, ArrowSolver};
 use crate::Matrix;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, MatMut, MatRef, Par};
@@ -16,8 +16,11 @@ const REGULARIZATION: f64 = 1e-14;
 /// does not free an unknown at its bound.
 const SLACK: f64 = 1e-12;
 
-/// Exchanges of whole sets of unknowns between free and held before single ones are exchanged: three to eight are usual.
-const EXCHANGES: usize = 20;
+/// Exchanges of whole sets of unknowns that may leave as many at a wrong place as before, until one at a time is exchanged.
+const PATIENCE: usize = 10;
+
+/// Exchanges for each unknown, before the active set method is used: more would be a cycle of rounding errors.
+const EXCHANGES: usize = 3;
 
 /// The normal equations `gram x = rhs` of a least squares problem, accumulated without storing its regressor.
 #[derive(Clone, Debug)]
@@ -79,10 +82,11 @@ fn add_squares(gram: &mut Matrix, factor: &Matrix) {
 
 /// Minimizes `x^T gram x - 2 x^T rhs` over `lower <= x <= upper`, an interval that contains zero.
 ///
-/// All unknowns beyond a bound are held there at once, and all that a step inwards would lower the cost are freed at once
-/// (block principal pivoting, J. Judice and F. Pires 1994). It ends in the only minimum, or does not end: then unknowns are
-/// exchanged one by one (the active set method of Lawson and Hanson, with two bounds as by Stark and Parker), which takes
-/// one decomposition for each.
+/// All unknowns beyond a bound are held there at once, and all that a step inwards would lower the cost are freed at once;
+/// where the number of those at a wrong place does not fall for several exchanges, only the last of them is exchanged until
+/// it does (block principal pivoting with Murty's rule, J. Judice and F. Pires 1994). It ends in the only minimum, or
+/// rounding errors prevent the end: then the active set method of Lawson and Hanson, with two bounds as by Stark and
+/// Parker, takes one decomposition for each unknown.
 ///
 /// Bounds may be infinite. The unknowns are scaled first, so that the diagonal of the Gram matrix is one. Unidentifiable
 /// combinations of unknowns are close to zero.
@@ -99,25 +103,37 @@ pub(crate) fn bounded(gram: &Arrow, rhs: &Vector, lower: &Vector, upper: &Vector
 /// The minimum by exchanges of whole sets; `None` where they do not end.
 fn pivoted(gram: &Arrow, rhs: &Vector, lower: &Vector, upper: &Vector) -> Option<Vector> {
     let n = rhs.len();
-    let mut x = DVector::zeros(n);
+    let mut solver = ArrowSolver::new(gram);
+    let mut x: Vector = DVector::zeros(n);
     let mut passive: Vec<bool> = (0..n).map(|i| lower[i] < upper[i]).collect();
     let slack = SLACK * rhs.amax();
-    for _ in 0..EXCHANGES {
-        x = passive_solution(gram, rhs, &x, &passive);
+    let (mut fewest, mut patience) = (n + 1, PATIENCE);
+    for _ in 0..PATIENCE + EXCHANGES * n {
+        x = passive_solution(&mut solver, gram, rhs, &x, &passive);
         let descent = rhs - gram.times(&x);
-        let mut changed = false;
-        for i in 0..n {
-            if passive[i] && (x[i] < lower[i] || x[i] > upper[i]) {
-                x[i] = x[i].clamp(lower[i], upper[i]);
-                passive[i] = false;
-                changed = true;
-            } else if !passive[i] && inward(descent[i], x[i], lower[i], upper[i]) > slack {
-                passive[i] = true;
-                changed = true;
+        let is_misplaced = |&i: &usize| {
+            if passive[i] {
+                x[i] < lower[i] || x[i] > upper[i]
+            } else {
+                inward(descent[i], x[i], lower[i], upper[i]) > slack
             }
-        }
-        if !changed {
+        };
+        let mut misplaced: Vec<usize> = (0..n).filter(is_misplaced).collect();
+        if misplaced.is_empty() {
             return x.iter().all(|value| value.is_finite()).then_some(x);
+        }
+        if misplaced.len() < fewest {
+            (fewest, patience) = (misplaced.len(), PATIENCE);
+        } else if patience > 0 {
+            patience -= 1;
+        } else {
+            misplaced.drain(..misplaced.len() - 1);
+        }
+        for i in misplaced {
+            if passive[i] {
+                x[i] = x[i].clamp(lower[i], upper[i]);
+            }
+            passive[i] = !passive[i];
         }
     }
     None
@@ -134,6 +150,7 @@ fn inward(descent: f64, x: f64, lower: f64, upper: f64) -> f64 {
 
 fn active_set(gram: &Arrow, rhs: &Vector, lower: &Vector, upper: &Vector) -> Vector {
     let n = rhs.len();
+    let mut solver = ArrowSolver::new(gram);
     let mut x = DVector::zeros(n);
     // all unknowns are free at first; those beyond a bound are fixed to it one by one
     let mut passive: Vec<bool> = (0..n).map(|i| lower[i] < upper[i]).collect();
@@ -141,7 +158,7 @@ fn active_set(gram: &Arrow, rhs: &Vector, lower: &Vector, upper: &Vector) -> Vec
     // each change of the active set lowers the cost; the limit prevents cycling due to rounding
     for _ in 0..3 * n.max(1) {
         while passive.iter().any(|&free| free) {
-            let target = passive_solution(gram, rhs, &x, &passive);
+            let target = passive_solution(&mut solver, gram, rhs, &x, &passive);
             let mut fraction = 1.0;
             let mut blocking = None;
             let is_beyond = |&i: &usize| target[i] < lower[i] || target[i] > upper[i];
@@ -169,9 +186,15 @@ fn active_set(gram: &Arrow, rhs: &Vector, lower: &Vector, upper: &Vector) -> Vec
 }
 
 /// The minimum over the passive (free) unknowns, with the others fixed at `x`.
-fn passive_solution(gram: &Arrow, rhs: &Vector, x: &Vector, passive: &[bool]) -> Vector {
+fn passive_solution(
+    solver: &mut ArrowSolver,
+    gram: &Arrow,
+    rhs: &Vector,
+    x: &Vector,
+    passive: &[bool],
+) -> Vector {
     let held = DVector::from_fn(x.len(), |i, _| if passive[i] { 0.0 } else { x[i] });
-    match gram.solve(&(rhs - gram.times(&held)), passive) {
+    match solver.solve(&(rhs - gram.times(&held)), passive) {
         Some(found) => held + found,
         None => x.clone(),
     }
@@ -209,5 +232,29 @@ mod tests {
         let one_by_one = active_set(&gram, &rhs, &lower, &upper);
         assert!((pivoted(&gram, &rhs, &lower, &upper).unwrap() - one_by_one).amax() < 1e-10);
         assert_eq!(x[largest], upper[largest], "and an upper one");
+    }
+
+    #[test]
+    fn many_bounds_of_many_groups_end_in_the_same_minimum() {
+        let groups: Vec<Vec<usize>> = (0..30).map(|e| (4 + 6 * e..10 + 6 * e).collect()).collect();
+        let unknowns = 4 + 6 * groups.len();
+        let mut gram = Arrow::zeros(unknowns, groups.clone());
+        let mut rhs = DVector::zeros(unknowns);
+        for (number, group) in groups.iter().enumerate() {
+            let places: Vec<usize> = (0..4).chain(group.iter().copied()).collect();
+            let a = Matrix::from_fn(14, 10, |i, j| {
+                ((i * (j + 2) + 7 * number) as f64 * 0.37).sin() + 0.4
+            });
+            let b = DVector::from_fn(14, |i, _| ((i * 3 + number) as f64 * 0.83).cos());
+            gram.add_part(&a.tr_mul(&a), &places);
+            let own = a.tr_mul(&b);
+            places.iter().zip(own.iter()).for_each(|(&i, value)| rhs[i] += value);
+        }
+        let bound = DVector::from_element(unknowns, 0.05);
+        let found = pivoted(&gram, &rhs, &-&bound, &bound).unwrap();
+        let held = found.iter().filter(|x| x.abs() == 0.05).count();
+        assert!(held > unknowns / 4 && held < unknowns, "{held}");
+        let expected = active_set(&gram, &rhs, &-&bound, &bound);
+        assert!((found - expected).amax() < 1e-7);
     }
 }
