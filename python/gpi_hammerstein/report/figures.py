@@ -11,20 +11,21 @@ from numpy.typing import NDArray
 from gpi_hammerstein import plot
 from gpi_hammerstein._native import Explanation, Model, StateSpace, era
 from gpi_hammerstein.plot.linear import settling_taps
-from gpi_hammerstein.plot.style import BLACK, BLUE, ORANGE, VERMILION, label, shade_path, with_bands
+from gpi_hammerstein.plot.style import BLACK, BLUE, ORANGE, VERMILION, label, pale, with_bands
 from gpi_hammerstein.report.series import Errors
 from gpi_hammerstein.report.svg import Draw
+from gpi_hammerstein.uncertain import BAND
 
 # Largest number of experiments, and of inputs, whose loop is drawn.
 MOST_EXPERIMENTS, MOST_INPUTS = 4, 4
 # Largest number of Markov parameters for a Hankel matrix.
 MOST_TAPS = 400
 # Samples of the loop that are drawn as lines; more lines would cover one another.
-STRETCH = 2000
+STRETCH = 1200
 # Samples of the whole record in the picture of the loop.
 MOST_POINTS = 20_000
 # Samples of each branch of the slow loop.
-BRANCH = 150
+BRANCH = 80
 # Swings of the slow loop, as parts of the range of the input: large and small loops in one picture.
 SWINGS = (1.0, 0.6, 0.3)
 USUAL, SQUARE = (7.0, 4.2), (5.5, 5.0)
@@ -112,10 +113,13 @@ def draw_slow_loop(found: Explanation, index: int, ax: Axes) -> None:
     drawn = slice(2 * BRANCH, None)
     ax.plot(u[drawn, index], v[drawn], color=VERMILION, lw=1.0)
     if (known := with_bands(model.refinement)) is not None:
-        deviation = known.loop_std(u)[:, index]
-        shade_path(ax, u[drawn, index], v[drawn], deviation[drawn], VERMILION, record.output_units[0])
-        if ax.get_legend_handles_labels()[0]:
-            ax.legend(loc="upper left")
+        half = BAND * known.loop_std(u)[:, index]
+        for first in range(2 * BRANCH, len(u), BRANCH):
+            # each branch is a line over the input, with its own band; the last point begins the next branch
+            part = slice(first, first + BRANCH + 1)
+            ax.fill_between(
+                u[part, index], v[part] - half[part], v[part] + half[part], color=pale(VERMILION), lw=0, zorder=1
+            )
     ax.set_xlabel(label(record.input_names[index], record.input_units[index]))
     unit = record.output_units[0] if len(record.output_names) == 1 else ""
     ax.set_ylabel(label("intermediate signal v", unit))

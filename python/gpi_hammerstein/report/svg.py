@@ -80,8 +80,9 @@ def as_svg(key: str, draw: Draw, size: tuple[float, float]) -> str:
     svg = re.sub("<!--.*?-->|<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     svg = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", svg, flags=re.DOTALL)
     svg = re.sub(r' style="([^"]*)"', lambda found: attributes(found[1]), svg)
-    # two digits after the point are 1/100 of a dot
-    svg = re.sub(r"(?<=[ \"])(-?\d+\.\d{2})\d+(?=[ \"\n])", r"\1", svg)
+    # a tenth of a point is smaller than a dot of a screen
+    svg = re.sub(r"(?<=[ \"])(-?\d+\.\d)\d+(?=[ \"\n])", r"\1", svg)
+    svg = re.sub(r"\s*\n\s*", "\n", svg).replace("\nL ", "L").replace(" L", "L")
     for color, by_page in page_colours().items():
         svg = re.sub(color, by_page, svg, flags=re.IGNORECASE)
     head, rest = svg.split(">", 1)

@@ -56,8 +56,8 @@ class TimeChart {
       cursor: { y: false, drag: { x: true, y: false, setScale: false },
         bind: { dblclick: () => () => { group.whole(); return null; } } },
       scales: { x: { time: false, range: () => this.shown() },
-        y: { range: (plot, low, high) => this.vertical(low, high) } },
-      axes: [axis("time [s]"), axis(label, { size: room })],
+        y: { auto: false, range: (plot, low, high) => [low, high] } },
+      axes: [axis("time [s]", { size: 26 }), axis(label, { size: room })],
       hooks: {
         drawClear: [() => this.shade()],
         setCursor: [() => group.point(this)],
@@ -69,11 +69,22 @@ class TimeChart {
   // The part of the experiment in this picture, in seconds.
   shown() { return this.detail ?? this.group.range; }
 
-  vertical(low, high) {
-    if (low === null || high === null) return [-1, 1];
+  // The limits of the vertical axis: all visible values of the lines that are shown, and a margin.
+  vertical(view, [from, to]) {
+    let low = Infinity, high = -Infinity;
+    for (const one of this.lines) {
+      if (this.group.hidden.has(one.kind)) continue;
+      const own = view.signals[one.name];
+      for (let i = 0; i < view.time.length; i++) {
+        if (view.time[i] < from || view.time[i] > to) continue;
+        if (own.low[i] < low) low = own.low[i];
+        if (own.high[i] > high) high = own.high[i];
+      }
+    }
+    if (low > high) return { min: -1, max: 1 };
     if (this.range) [low, high] = this.range(low, high);
     const margin = high > low ? 0.06 * (high - low) : Math.abs(high) || 1;
-    return [low - margin, high + margin];
+    return { min: low - margin, max: high + margin };
   }
 
   // Computes what is visible again, and draws it.
@@ -93,6 +104,7 @@ class TimeChart {
         this.plot.setSeries(this.lines.length + i, { show: !this.group.hidden.has("band") }, false);
       this.plot.setData(data, false);
       this.plot.setScale("x", { min: from, max: to });
+      this.plot.setScale("y", this.vertical(view, [from, to]));
     });
   }
 

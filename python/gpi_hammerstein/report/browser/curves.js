@@ -44,7 +44,7 @@ class Curves {
       cursor: { y: false, drag: { x: true, y: false } },
       series: [{}, ...lines.map((line) => ({ points: { show: false }, ...line }))],
       scales: { x: { time: false, ...scale }, y: { ...scale } },
-      axes: [axis(label), axis(vertical, { size: room, ...(logarithmic ? { values: powers } : {}) })],
+      axes: [axis(label, { size: 26 }), axis(vertical, { size: room, ...(logarithmic ? { values: powers } : {}) })],
     }, data, host)]);
   }
 
