@@ -95,7 +95,7 @@ def better(found: Explanation, unit: str) -> tuple[str, str]:
         short = "Not better on held-out data"
     sentences = [f"Held-out error: {before:.4g}{space} → {after:.4g}{space} rms."]
     if noise > 0:
-        sentences.append(f"This is {after / noise:.3g} times the noise floor of {noise:.3g}{space}.")
+        sentences.append(f"Noise floor: {noise:.3g}{space}; error over noise: {after / noise:.3g}.")
     scored: list[Mapping[str, Any]] = [row for row in found.rivals if row["holdout_rms"] is not None]
     if scored:
         best = min(scored, key=lambda row: row["holdout_rms"])

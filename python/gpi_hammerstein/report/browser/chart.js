@@ -57,7 +57,7 @@ class TimeChart {
         bind: { dblclick: () => () => { group.whole(); return null; } } },
       scales: { x: { time: false, range: () => this.shown() },
         y: { auto: false, range: (plot, low, high) => [low, high] } },
-      axes: [axis("time [s]", { size: 26 }), axis(label, { size: room })],
+      axes: [axis("time [s]", { size: 34 }), axis(label, { size: room })],
       hooks: {
         drawClear: [() => this.shade()],
         setCursor: [() => group.point(this)],

@@ -4,8 +4,8 @@ class Curves {
   // `rows`: the curves of one experiment and output; `input`: the channel of the pictures over the input.
   constructor(rows, output, input) {
     this.plots = [];
-    const { name, unit, noise } = stored.outputs[output], channel = stored.inputs[input];
-    const errorLabel = labelled(`residual of ${name}`, unit);
+    const { unit, noise } = stored.outputs[output], channel = stored.inputs[input];
+    const errorLabel = labelled("residual", unit);
     const { spectrum, autocorrelation } = rows, over = rows.over[input];
     if (spectrum) {
       const lines = spectrum.densities.map((own) => unpack(own).map((power) => 10 ** power));
@@ -37,6 +37,8 @@ class Curves {
 
   add(id, title, label, vertical, data, lines, bands, logarithmic = false) {
     const host = document.getElementById(id);
+    // lines of the grid only at powers of ten
+    const decades = logarithmic ? { grid: { stroke: colour("line"), width: 1, filter: onlyPowers } } : {};
     const scale = logarithmic ? { distr: 3 } : {};
     this.plots.push([host, new uPlot({
       title, width: widthOf(host), height: 260, bands,
@@ -44,7 +46,7 @@ class Curves {
       cursor: { y: false, drag: { x: true, y: false } },
       series: [{}, ...lines.map((line) => ({ points: { show: false }, ...line }))],
       scales: { x: { time: false, ...scale }, y: { ...scale } },
-      axes: [axis(label, { size: 26 }), axis(vertical, { size: room, ...(logarithmic ? { values: powers } : {}) })],
+      axes: [axis(label, { size: 34, ...decades }), axis(vertical, { size: room, ...decades, ...(logarithmic && { values: powers }) })],
     }, data, host)]);
   }
 
@@ -54,8 +56,8 @@ class Curves {
 }
 
 const stroke = (name) => ({ stroke: colour(name), width: 1.3 });
+const isPower = (value) => Math.abs(Math.log10(value) - Math.round(Math.log10(value))) < 1e-9;
+const onlyPowers = (plot, splits) => splits.map((value) => (value > 0 && isPower(value) ? value : null));
 // Numbers of a logarithmic axis, only at powers of ten.
-const powers = (plot, splits) => splits.map((value) => {
-  const power = Math.log10(value ?? NaN);
-  return Math.abs(power - Math.round(power)) < 1e-9 ? `1e${Math.round(power)}` : "";
-});
+const powers = (plot, splits) =>
+  splits.map((value) => (value > 0 && isPower(value) ? `1e${Math.round(Math.log10(value))}` : ""));

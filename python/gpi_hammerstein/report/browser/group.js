@@ -10,15 +10,18 @@ class Group {
     this.charts = [];
     this.pointing = false;
     const what = stored.outputs[output], o = output, { name, unit } = what;
-    const errorName = `residual of ${name}`, narrow = innerWidth < 800 || printing();
+    const narrow = innerWidth < 800 || printing();
     const one = (kind, signal, width, shade, dash) => ({ kind, name: signal + o, label: kind, width, dash, colour: shade });
     const outputs = [one("before", "before", 1.5, colour("before")), one("measured", "measured", 1.5, colour("ink")),
       one("after", "after", 1.2, colour("after"), [6, 3])];
     const band = { name: "after" + o, half: what.half_band, colour: colour("band") };
     const errors = [one("before", "errorBefore", 1, colour("before")), one("after", "errorAfter", 1, colour("after"))];
-    const limit = 3 * experiment.limits[o];
+    const limit = experiment.limits[o];
     // a few wrong samples, and the start, do not determine the axis of the whole record
-    const clipped = (low, high) => this.isWhole() ? [Math.max(low, -limit), Math.min(high, limit)] : [low, high];
+    const clipped = (low, high) => {
+      this.clipped = this.isWhole() && (low < -limit || high > limit);
+      return this.clipped ? [Math.max(low, -limit), Math.min(high, limit)] : [low, high];
+    };
     const add = (id, options) => {
       const host = document.getElementById(id);
       this.charts.push(new TimeChart(host, this, options));
@@ -28,7 +31,7 @@ class Group {
     add("chart-detail", { title: "The part with the largest error after", label: labelled(name, unit), lines: outputs, band,
       height: narrow ? 230 : 270, detail: this.largest() });
     // the band is that of the measured output around the simulated one
-    add("chart-residual", { title: "Residual: measured minus simulated", label: labelled(errorName, unit), lines: errors,
+    add("chart-residual", { title: `Residual of ${name}: measured minus simulated`, label: labelled("residual", unit), lines: errors,
       height: narrow ? 190 : 210, range: clipped });
     const channels = [...stored.inputs.map((own, i) => ({ ...own, signal: "input" + i })),
       ...stored.covariates.map((own, i) => ({ ...own, signal: "covariate" + i }))];
@@ -73,10 +76,11 @@ class Group {
   update() {
     for (const chart of this.charts) chart.update();
     const { stored: every } = this.charts[0].view;
-    document.getElementById("resolution").textContent = every === 1
+    document.getElementById("resolution").textContent = (this.clipped
+      ? "Some values of the residual are outside its axis; zoom in to see them. " : "") + (every === 1
       ? "Here the page contains every sample."
       : `Here the page contains the smallest and the largest value of each ${every} samples, and every sample around the `
-        + "largest error.";
+        + "largest error.");
   }
 
   // The pointer is in one picture: marks the same time in all others and reads the values.

@@ -78,5 +78,16 @@ addEventListener("resize", () => {
   cancelAnimationFrame(waiting);
   waiting = requestAnimationFrame(() => { group.resize(); curves?.resize(); });
 });
-addEventListener("beforeprint", () => { document.documentElement.classList.add("printing"); build(); });
-addEventListener("afterprint", () => { document.documentElement.classList.remove("printing"); build(); });
+// Paper shows everything, and is white.
+let opened = [];
+addEventListener("beforeprint", () => {
+  opened = [...document.querySelectorAll("details:not([open])")];
+  for (const details of opened) details.open = true;
+  document.documentElement.classList.add("printing");
+  build();
+});
+addEventListener("afterprint", () => {
+  for (const details of opened) details.open = false;
+  document.documentElement.classList.remove("printing");
+  build();
+});
