@@ -35,7 +35,9 @@ OPTIONS = [
 
 
 @contextmanager
-def opened(page: Path, folder: Path, width: int = 1400, height: int = 900, *, dark: bool = False) -> Iterator[Any]:
+def opened(
+    page: Path, folder: Path, width: int = 1400, height: int = 900, *, dark: bool = False
+) -> Iterator[Any]:
     """The driver of a browser that shows a page; its profile is in `folder`."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service

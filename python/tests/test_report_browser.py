@@ -1,4 +1,4 @@
-"""The report in a real browser: it is drawn quickly, zooms, reads values, and fits a phone, the dark and paper."""
+"""The report in a real browser: quick, zoomed, read, and fit for a phone, the dark and paper."""
 
 import base64
 import io
@@ -22,7 +22,7 @@ SECONDS = 2.0
 
 
 def explained(lengths, outputs=2):
-    """Some experiments of a play, with a hum that the declared model lacks; one output is half of the other."""
+    """Some experiments of a play, with a hum that the declared model lacks; the outputs are proportional."""
     random = np.random.default_rng(3)
     us, ys = [], []
     for k, samples in enumerate(lengths):
@@ -232,12 +232,14 @@ def test_it_is_light_or_dark(file, tmp_path, dark):
     with opened(file, tmp_path, dark=dark) as driver:
         pixels = screen(driver)
         assert complaints(driver) == []
-    paper, ink = (pixels < 0.2, pixels.min(axis=2) > 0.6) if dark else (pixels > 0.9, pixels.max(axis=2) < 0.4)
+    paper, ink = (
+        (pixels < 0.2, pixels.min(axis=2) > 0.6) if dark else (pixels > 0.9, pixels.max(axis=2) < 0.4)
+    )
     assert np.mean(paper) > 0.6 and np.mean(ink) > 0.005
 
 
 def test_paper_is_white_and_shows_everything(file, tmp_path):
-    """Before it prints, the page closes no table, draws in the colours of paper, and no picture is too wide."""
+    """On paper, all tables are open, the colours are those of paper, and no picture is too wide."""
     with opened(file, tmp_path, dark=True) as driver:
         driver.execute_script(
             "addEventListener('beforeprint', () => { document.title = JSON.stringify(["

@@ -62,9 +62,7 @@ def report(
     recording, found, _ = explained(records, read, experiments, holdout_record, effects=chosen)
     files.save_model(found.model, model_file)
     with working("drawing"):
-        write_report(
-            found, out, command=context.obj, notes=recording.notes, model_file=model_file.name
-        )
+        write_report(found, out, command=context.obj, notes=recording.notes, model_file=model_file.name)
     screen = console()
     for sentence in in_words(to_dict(found), common_unit(found.record), numbers=False):
         screen.print(escape(sentence))

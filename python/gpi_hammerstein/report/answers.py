@@ -68,13 +68,18 @@ def sure(found: Explanation, components: Sequence[Component]) -> tuple[str, str]
     """Return the verdict in short, the tests that passed, and the evidence of the effects."""
     short, _, rest = VERDICTS[found.verdict].partition(":")
     passed = sum(test["passed"] for test in found.tests)
-    sentences = [rest.strip().capitalize(), f"{passed} of {len(found.tests)} tests of the residual are passed."]
+    sentences = [
+        rest.strip().capitalize(),
+        f"{passed} of {len(found.tests)} tests of the residual are passed.",
+    ]
     if components:
         weakest = min(components, key=lambda one: one.evidence)
         sentences.append(
             f"The evidence is at least {weakest.evidence:.3g} times the significance threshold ({weakest.effect})."
         )
-    confused = sorted({name for other in found.rejected for name in (other["effect"],) if other["confounded_with"]})
+    confused = sorted(
+        {name for other in found.rejected for name in (other["effect"],) if other["confounded_with"]}
+    )
     if confused:
         sentences.append(f"This record cannot rule out {join(confused)}.")
     if found.interrupted:

@@ -122,6 +122,8 @@ def classes(x: Array, both: Sequence[Array]) -> dict[str, Any] | None:
     if not high > low:
         return None
     place = np.floor((x - low) / (high - low) * CLASSES)
+    # an input often rests at its largest value, which belongs to the last class
+    place[x == high] = CLASSES - 1
     order = np.argsort(place, kind="stable")
     edges = np.searchsorted(place[order], np.arange(CLASSES + 1))
     middles: list[float] = []

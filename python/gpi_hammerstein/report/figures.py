@@ -74,9 +74,7 @@ def linear_pictures(model: Model) -> Iterator[Picture]:
         lambda ax: plot.bode(model.linear, model.rate, ax, refinement=model.refinement),
         USUAL,
     )
-    yield Picture(
-        "markov", "Markov parameters of the linear part.", lambda ax: plot.markov(model, ax), USUAL
-    )
+    yield Picture("markov", "Markov parameters of the linear part.", lambda ax: plot.markov(model, ax), USUAL)
     yield Picture(
         "singular-values",
         "Singular values of the Hankel matrix of these Markov parameters.",
@@ -118,7 +116,12 @@ def draw_slow_loop(found: Explanation, index: int, ax: Axes) -> None:
             # each branch is a line over the input, with its own band; the last point begins the next branch
             part = slice(first, first + BRANCH + 1)
             ax.fill_between(
-                u[part, index], v[part] - half[part], v[part] + half[part], color=pale(VERMILION), lw=0, zorder=1
+                u[part, index],
+                v[part] - half[part],
+                v[part] + half[part],
+                color=pale(VERMILION),
+                lw=0,
+                zorder=1,
             )
     ax.set_xlabel(label(record.input_names[index], record.input_units[index]))
     unit = record.output_units[0] if len(record.output_names) == 1 else ""

@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 # Largest integer of a sample. Its negative is the smallest one.
 LARGEST = 32_767
+# Largest absolute value of a signal with 4 bytes; the differences of two such values do not overflow.
+MOST = 1e38
 
 
 def bytes_of(values: Array, largest_step: float) -> int:
@@ -37,7 +39,9 @@ def bytes_of(values: Array, largest_step: float) -> int:
     >>> bytes_of(np.array([0.0, 1.0]), 0.01), bytes_of(np.array([0.0, 1.0]), 1e-9)
     (2, 4)
     """
-    return 2 if len(values) == 0 or np.ptp(values) <= 2 * LARGEST * largest_step else 4
+    if len(values) == 0 or np.abs(values).max() > MOST:
+        return 2
+    return 2 if np.ptp(values) <= 2 * LARGEST * largest_step else 4
 
 
 def packed(values: Array, size: int) -> dict[str, Any]:

@@ -48,14 +48,13 @@ def data_hash(record: Record) -> str:
     Examples
     --------
     >>> data_hash(gpi.Record([1.0, 2.0], [3.0, 4.0], 10.0))[:8]
-    'bce8d95c'
+    '6bab56d2'
     """
     digest = hashlib.sha256()
-    covariates = record.covariates or [None] * len(record.u)
-    for one in zip(record.u, record.y, covariates, strict=True):
+    channels = [record.u, record.y, *([record.covariates] if record.covariate_names else [])]
+    for one in zip(*channels, strict=True):
         for samples in one:
-            if samples is not None:
-                digest.update(np.ascontiguousarray(samples, dtype="<f8").tobytes())
+            digest.update(np.ascontiguousarray(samples, dtype="<f8").tobytes())
     return digest.hexdigest()
 
 
@@ -86,11 +85,18 @@ def commands(model: Model, file: str | None) -> Iterator[tuple[str, str]]:
     """
     name = shlex.quote(file or "model.json")
     if file is None:
-        yield "Save the model, in Python. The commands below read this file.", 'found.model.save("model.json")'
-    yield "Test the model on another record of the same actuator.", f"gpi validate {name} OTHER.csv -o validated"
+        yield (
+            "Save the model, in Python. The commands below read this file.",
+            'found.model.save("model.json")',
+        )
+    yield (
+        "Test the model on another record of the same actuator.",
+        f"gpi validate {name} OTHER.csv -o validated",
+    )
     yield "Simulate the output for an input.", f"gpi simulate {name} INPUT.csv -o simulated"
-    yield "Compute the drive that makes the output follow a reference.", (
-        f"gpi compensate {name} REFERENCE.csv -o compensated"
+    yield (
+        "Compute the drive that makes the output follow a reference.",
+        (f"gpi compensate {name} REFERENCE.csv -o compensated"),
     )
     if len(model.input_names) == len(model.output_names) == 1:
         yield "Write the compensator as C99 for a microcontroller.", f"gpi export {name} --c compensator"

@@ -129,12 +129,20 @@ def contributions(found: Explanation, own: Sequence[Component], unit: str) -> st
         shown.add(one.effect)
     before, after = found.before["train"]["rms"], found.after["train"]["rms"]
     share = (after / before) ** 2 if before > 0 else 0.0
-    rows.append(["residual", "what is left in the end", f"{100 * share:.3g} %", f"{after:.4g}{label and f' {unit}'}", *[""] * 4])
+    rows.append(
+        [
+            "residual",
+            "what is left in the end",
+            f"{100 * share:.3g} %",
+            f"{after:.4g}{label and f' {unit}'}",
+            *[""] * 4,
+        ]
+    )
     return table(head, rows, range(2, 8)) + (
-        "<p>The share is the part of the squares of the declared model's residual that the effect removed when it was "
-        "added, on the training data. The size is the rms change of the simulated output. The evidence is the deviance "
-        "over its significance threshold; above 1 it is significant. All parts were refined jointly after the last "
-        "effect, so that the shares do not add up exactly.</p>"
+        "<p>The share is the part of the squares of the declared model's residual that the effect removed when "
+        "it was added, on the training data. The size is the rms change of the simulated output. The evidence is "
+        "the deviance over its significance threshold; above 1 it is significant. All parts were refined jointly "
+        "after the last effect, so that the shares do not add up exactly.</p>"
     )
 
 
