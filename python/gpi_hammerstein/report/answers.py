@@ -75,7 +75,8 @@ def sure(found: Explanation, components: Sequence[Component]) -> tuple[str, str]
     if components:
         weakest = min(components, key=lambda one: one.evidence)
         sentences.append(
-            f"The evidence is at least {weakest.evidence:.3g} times the significance threshold ({weakest.effect})."
+            f"The evidence is at least {weakest.evidence:.3g} times the significance threshold "
+            f"({weakest.effect})."
         )
     confused = sorted(
         {name for other in found.rejected for name in (other["effect"],) if other["confounded_with"]}

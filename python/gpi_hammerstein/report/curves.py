@@ -1,7 +1,7 @@
 """The residual over frequency, lag, input and speed, as numbers for the page.
 
-A cloud of points hides most of its points. The residual over the input and over the speed is therefore drawn as
-its mean, and the 5 % and 95 % quantiles, in classes of equal width.
+A cloud of points hides most of its points. The residual over the input and over the speed is therefore drawn
+as its mean, and the 5 % and 95 % quantiles, in classes of equal width.
 """
 
 from collections.abc import Sequence

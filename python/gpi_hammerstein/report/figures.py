@@ -33,7 +33,7 @@ USUAL, SQUARE = (7.0, 4.2), (5.5, 5.0)
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture: its name, its caption, how it is drawn, its size in inches, and its experiment if it has one."""
+    """A picture: name, caption, how it is drawn, size in inches, and the experiment if it has one."""
 
     key: str
     what: str
@@ -50,8 +50,8 @@ def loop_pictures(found: Explanation, errors: Errors) -> Iterator[Picture]:
         when = f", experiment {k}" if len(errors.after) > 1 else ""
         yield Picture(
             f"loop-{k}",
-            f"{y} over {u}{when}: all scored samples in grey; measured, before and after for the samples around "
-            "the largest error.",
+            f"{y} over {u}{when}: all scored samples in grey; measured, before and after for the samples "
+            "around the largest error.",
             partial(draw_loop, errors, k),
             SQUARE,
             k,
@@ -59,8 +59,8 @@ def loop_pictures(found: Explanation, errors: Errors) -> Iterator[Picture]:
     for index, name in enumerate(record.input_names[:MOST_INPUTS]):
         yield Picture(
             f"slow-{index}",
-            f"Hysteresis of the model for slow motion of {name}: the intermediate signal, which drives the linear "
-            "part, over the input. The band is that of the parameters' uncertainty, 95 %.",
+            f"Hysteresis of the model for slow motion of {name}: the intermediate signal, which drives the "
+            "linear part, over the input. The band is that of the parameters' uncertainty, 95 %.",
             partial(draw_slow_loop, found, index),
             SQUARE,
         )

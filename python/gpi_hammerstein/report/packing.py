@@ -1,8 +1,8 @@
 """Samples as base64 text of small numbers, for typed arrays in the browser.
 
-A signal ``x`` is stored as 16 bit integers ``q`` with ``x = offset + step q`` if the rounding error, which is at
-most half a step, is small enough. It is stored as 32 bit floating point numbers ``x - offset`` otherwise. Both
-are little-endian.
+A signal ``x`` is stored as 16 bit integers ``q`` with ``x = offset + step q`` if the rounding error, which is
+at most half a step, is small enough. It is stored as 32 bit floating point numbers ``x - offset`` otherwise.
+Both are little-endian.
 """
 
 import base64

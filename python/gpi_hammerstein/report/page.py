@@ -134,7 +134,8 @@ def next_experiment(found: Explanation) -> str:
         return ""
     why, command = found.next_experiment["why"], found.next_experiment["command"]
     line = f"<pre>{escape(command)}</pre>" if command else ""
-    return f'<h3 id="next">Next experiment</h3><p>{escape(why[:1].upper() + why[1:])}.</p>{line}<h3>Use the model</h3>'
+    why = escape(why[:1].upper() + why[1:])
+    return f'<h3 id="next">Next experiment</h3><p>{why}.</p>{line}<h3>Use the model</h3>'
 
 
 def origin(found: Explanation, command: str | None, date: str, model_file: str | None) -> str:

@@ -18,8 +18,8 @@ UPLOT = "1.6.32"
 def date() -> str:
     """Return the date and time in UTC.
 
-    The environment variable SOURCE_DATE_EPOCH, in seconds since 1970, replaces the clock, so that a page can be
-    reproduced (https://reproducible-builds.org/specs/source-date-epoch/).
+    The environment variable SOURCE_DATE_EPOCH, in seconds since 1970, replaces the clock, so that a page can
+    be reproduced (https://reproducible-builds.org/specs/source-date-epoch/).
     """
     wanted = os.environ.get("SOURCE_DATE_EPOCH", "")
     now = datetime.datetime.now(datetime.UTC)
@@ -31,9 +31,9 @@ def date() -> str:
 def data_hash(record: Record) -> str:
     """Return the SHA-256 of the samples of a record, in hexadecimal digits.
 
-    It is that of the bytes of all experiments, one after the other: the inputs, the outputs and the covariates,
-    each as little-endian 64 bit floating point numbers of shape (samples, channels), row by row. Names, units and
-    the sampling rate are no part of it.
+    It is that of the bytes of all experiments, one after the other: the inputs, the outputs and the
+    covariates, each as little-endian 64 bit floating point numbers of shape (samples, channels), row by row.
+    Names, units and the sampling rate are no part of it.
 
     Parameters
     ----------
@@ -60,7 +60,8 @@ def data_hash(record: Record) -> str:
 
 def versions() -> str:
     """Return the versions of the programs that made the page."""
-    return f"gpi-hammerstein {__version__}, Python {platform.python_version()}, NumPy {np.__version__}, uPlot {UPLOT}"
+    python = f"Python {platform.python_version()}, NumPy {np.__version__}"
+    return f"gpi-hammerstein {__version__}, {python}, uPlot {UPLOT}"
 
 
 def commands(model: Model, file: str | None) -> Iterator[tuple[str, str]]:

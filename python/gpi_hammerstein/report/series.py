@@ -1,12 +1,12 @@
 """The time series of the page: which samples it contains, and at which rate.
 
-If all samples fit into `DATA_BYTES`, the page contains all of them. Otherwise it contains, for each experiment,
-the smallest and the largest value of each group of ``every`` samples, so that no extreme is lost, and all
-samples of a window around the place where the error is largest.
+If all samples fit into `DATA_BYTES`, the page contains all of them. Otherwise it contains, for each
+experiment, the smallest and the largest value of each group of ``every`` samples, so that no extreme is lost,
+and all samples of a window around the place where the error is largest.
 
-The error of an output is e = y - yhat. All samples are stored as y, e of the declared model and e of the model
-with effects; the browser computes yhat = y - e. The extremes of yhat do not follow from those of y and e. They
-are stored too.
+The error of an output is e = y - yhat. All samples are stored as y, e of the declared model and e of the
+model with effects; the browser computes yhat = y - e. The extremes of yhat do not follow from those of y and
+e. They are stored too.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Pictures of Matplotlib as small SVG elements that use the colours of the page.
 
-The page permits no style attributes. They become attributes of their own, such as ``stroke``, which SVG has for
-every property that Matplotlib uses.
+The page permits no style attributes. They become attributes of their own, such as ``stroke``, which SVG has
+for every property that Matplotlib uses.
 """
 
 import io
@@ -111,8 +111,8 @@ def attributes(style: str) -> str:
     for declaration in style.split(";"):
         name, _, value = (part.strip() for part in declaration.partition(":"))
         if name == "font":
-            weight, size, family = re.fullmatch(r"(.*?)\s*([\d.]+px)\s+(.*)", value).groups()  # type: ignore[union-attr]
-            if weight:
+            weight, size, family = re.fullmatch(r"(.*?)\s*([\d.]+px)\s+(.*)", value).groups()  # type:
+            ignore[union-attr] if weight:
                 found.append(f' font-weight="{weight}"')
             found += [f' font-size="{size}"', f' font-family="{family}"']
         elif name == "font-family":

@@ -139,10 +139,10 @@ def contributions(found: Explanation, own: Sequence[Component], unit: str) -> st
         ]
     )
     return table(head, rows, range(2, 8)) + (
-        "<p>The share is the part of the squares of the declared model's residual that the effect removed when "
-        "it was added, on the training data. The size is the rms change of the simulated output. The evidence is "
-        "the deviance over its significance threshold; above 1 it is significant. All parts were refined jointly "
-        "after the last effect, so that the shares do not add up exactly.</p>"
+        "<p>The share is the part of the squares of the declared model's residual that the effect removed "
+        "when it was added, on the training data. The size is the rms change of the simulated output. The "
+        "evidence is the deviance over its significance threshold; above 1 it is significant. All parts were "
+        "refined jointly after the last effect, so that the shares do not add up exactly.</p>"
     )
 
 
