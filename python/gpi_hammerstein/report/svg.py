@@ -111,8 +111,11 @@ def attributes(style: str) -> str:
     for declaration in style.split(";"):
         name, _, value = (part.strip() for part in declaration.partition(":"))
         if name == "font":
-            weight, size, family = re.fullmatch(r"(.*?)\s*([\d.]+px)\s+(.*)", value).groups()  # type:
-            ignore[union-attr] if weight:
+            parts = re.fullmatch(r"(.*?)\s*([\d.]+px)\s+(.*)", value)
+            if parts is None:
+                raise ValueError(f"not a font that Matplotlib writes: {value}")
+            weight, size, family = parts.groups()
+            if weight:
                 found.append(f' font-weight="{weight}"')
             found += [f' font-size="{size}"', f' font-family="{family}"']
         elif name == "font-family":
