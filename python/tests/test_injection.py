@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 import gpi_hammerstein as gpi
 from data_folder import DATA
 from gpi_hammerstein import cli, escaping, plot
-from gpi_hammerstein.report.page import policy
+from gpi_hammerstein.report.policy import policy
 from test_compensator import creeping, path
 
 CASES = DATA / "cases" / "inject"
@@ -216,7 +216,8 @@ def test_a_report_contains_only_its_own_elements(tmp_path):
     scripts = re.findall(r"<script>(.*?)</script>", hostile, flags=re.DOTALL)
     digest = base64.b64encode(hashlib.sha256(scripts[0].encode()).digest()).decode()
     assert len(scripts) == 1 and f"script-src 'sha256-{digest}'" in hostile
-    assert policy(scripts[0]) in hostile and "default-src 'none'" in hostile
+    [style] = re.findall(r"<style>(.*?)</style>", hostile, flags=re.DOTALL)
+    assert policy(scripts[0], style) in hostile and "default-src 'none'" in hostile
     # the policy is read before anything that it forbids
     assert hostile.index("Content-Security-Policy") < hostile.index("<title")
 

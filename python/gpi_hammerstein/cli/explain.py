@@ -209,7 +209,7 @@ def page_of(found: Explanation, command: str, notes: list[str]) -> str:
     from gpi_hammerstein.report import report_html
 
     with working("drawing"):
-        return report_html(found, command=command, notes=notes)
+        return report_html(found, command=command, notes=notes, model_file="model.json")
 
 
 def write_results(

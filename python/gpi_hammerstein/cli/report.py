@@ -5,10 +5,12 @@ from typing import Annotated, Any
 
 import typer
 
+from gpi_hammerstein import files
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.explain import explained, split_effects
 from gpi_hammerstein.cli.output import common_unit, console, escape, working
 from gpi_hammerstein.explanation import in_words, to_dict
+from gpi_hammerstein.files import require_file
 
 Out = Annotated[
     Path,
@@ -39,9 +41,12 @@ def report(
 ) -> int:
     """Explain a record and write one HTML page: verdict, errors, effects, pictures, quality of the data.
 
-    The page needs no network and no other files. `gpi explain --report` writes it together with the other
-    results.
+    The page needs no network and no other files. The model is written beside it: model.json beside
+    report.html, and NAME.model.json beside NAME.html. `gpi explain --report` writes the page together with
+    the other results.
     """
+    model_file = model_beside(out)
+    require_file(model_file, "out")
     from gpi_hammerstein.report import write_report
 
     read: dict[str, Any] = {
@@ -55,10 +60,16 @@ def report(
     }
     chosen = split_effects(effects)
     recording, found, _ = explained(records, read, experiments, holdout_record, effects=chosen)
+    files.save_model(found.model, model_file)
     with working("drawing"):
-        write_report(found, out, command=context.obj, notes=recording.notes)
+        write_report(found, out, command=context.obj, notes=recording.notes, model_file=model_file.name)
     screen = console()
     for sentence in in_words(to_dict(found), common_unit(found.record), numbers=False):
         screen.print(escape(sentence))
-    screen.print(f"Written: {escape(str(out))}")
+    screen.print(f"Written: {escape(str(out))}, {escape(str(model_file))}")
     return 130 if found.interrupted else 0
+
+
+def model_beside(page: Path) -> Path:
+    """Return the name of the model file of a page, which differs for pages of one folder."""
+    return page.with_name("model.json" if page.stem == "report" else f"{page.stem}.model.json")

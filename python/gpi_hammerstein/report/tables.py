@@ -9,6 +9,7 @@ import numpy as np
 from gpi_hammerstein._native import Explanation, Model, effect_names
 from gpi_hammerstein.comparison import rival_rows
 from gpi_hammerstein.held_out import rule_of
+from gpi_hammerstein.report.components import Component
 from gpi_hammerstein.stage import natural
 from gpi_hammerstein.uncertain import NOT_DETERMINED, OF_SIZE, p_value_in_words, spread
 
@@ -76,10 +77,94 @@ def effects(found: Explanation) -> str:
     return table(head, rows, (3, 4))
 
 
-def rejected(found: Explanation) -> str:
+def rejected(found: Explanation, unit: str) -> str:
     """Return the effects that were tried and not added."""
-    rows = [[other["effect"], other["why"]] for other in found.rejected]
-    return table(["effect", "why it was not added"], rows) if rows else ""
+    label = f" [{unit}]" if unit else ""
+    rows = [
+        [
+            other["effect"],
+            other["why"],
+            ", ".join(other["confounded_with"]),
+            "-" if other["holdout_rms"] is None else f"{other['holdout_rms']:.4g}",
+        ]
+        for other in found.rejected
+    ]
+    if not rows:
+        return "<p>No other effect was tried.</p>"
+    head = ["effect", "why it was not added", "not distinguished from", f"rms with it, held out{label}"]
+    return table(head, rows, (3,))
+
+
+def contributions(found: Explanation, own: Sequence[Component], unit: str) -> str:
+    """Return what each effect contributes, and what is left."""
+    if not own:
+        return "<p>No effect was added.</p>"
+    label = f" [{unit}]" if unit else ""
+    names, shown = effect_names(), set[str]()
+    head = [
+        "effect",
+        "what it is",
+        "share of the squared residual",
+        "size, rms" + (label if len(found.record.output_names) == 1 else ""),
+        f"rms without it, held out{label}",
+        f"rms with it{label}",
+        "gain",
+        "evidence",
+    ]
+    rows = []
+    for one in own:
+        gain = 1 - one.holdout_after / one.holdout_before if one.holdout_before > 0 else 0.0
+        rows.append(
+            [
+                one.effect,
+                "one more" if one.effect in shown else names[one.effect],
+                f"{100 * one.share:.3g} %",
+                sizes(found, one),
+                f"{one.holdout_before:.4g}",
+                f"{one.holdout_after:.4g}",
+                f"{100 * gain:.3g} %",
+                f"{one.evidence:.3g} ×",
+            ]
+        )
+        shown.add(one.effect)
+    before, after = found.before["train"]["rms"], found.after["train"]["rms"]
+    share = (after / before) ** 2 if before > 0 else 0.0
+    rows.append(
+        [
+            "residual",
+            "what is left in the end",
+            f"{100 * share:.3g} %",
+            f"{after:.4g}{label and f' {unit}'}",
+            *[""] * 4,
+        ]
+    )
+    return table(head, rows, range(2, 8)) + (
+        "<p>The share is the part of the squares of the declared model's residual that the effect removed "
+        "when it was added, on the training data. The size is the rms change of the simulated output. The "
+        "evidence is the deviance over its significance threshold; above 1 it is significant. All parts were "
+        "refined jointly after the last effect, so that the shares do not add up exactly.</p>"
+    )
+
+
+def sizes(found: Explanation, one: Component) -> str:
+    """Return the size of a component in the unit of each output."""
+    record = found.record
+    if len(one.size) == 1:
+        return f"{one.size[0]:.4g}"
+    each = zip(record.output_names, one.size, record.output_units, strict=True)
+    return ", ".join(f"{name}: {size:.3g} {unit}".rstrip() for name, size, unit in each)
+
+
+def parameters(model: Model) -> str:
+    """Return all parameters of the model with their uncertainties; closed if there are many."""
+    if model.refinement is None:
+        return "<p>The model was not refined; the uncertainties of its parameters are not known.</p>"
+    rows = []
+    for row in model.refinement.parameters:
+        known = [f"{row['value']:.5g}", spread(row)] if row["determined"] else [NOT_DETERMINED, ""]
+        rows.append([row["name"], *known, row["unit"]])
+    own = table(["parameter", "value", "95 %", "unit"], rows, (1, 2))
+    return f"<details><summary>All {len(rows)} parameters with their uncertainties</summary>{own}</details>"
 
 
 def tests(found: Explanation) -> str:

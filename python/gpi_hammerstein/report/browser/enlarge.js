@@ -1,4 +1,4 @@
-"use strict";
+// A click enlarges a picture that does not change. The wheel or two fingers zoom it, and dragging moves it.
 const dialog = document.querySelector("dialog");
 let view, home, pointers = new Map();
 const show = () => dialog.querySelector("svg").setAttribute("viewBox", view.join(" "));
