@@ -11,15 +11,19 @@ import numpy as np
 from gpi_hammerstein._native import DataError, ParameterError, Record
 from gpi_hammerstein.io.clock import resample as put_on_grid
 from gpi_hammerstein.io.clock import uniform_rate
-from gpi_hammerstein.io.columns import TIME_UNITS, Column, Roles, assign_roles
+from gpi_hammerstein.io.columns import TIME_UNITS, Column
 from gpi_hammerstein.io.formats import output_files, read_tables
 from gpi_hammerstein.io.frames import Frame, is_frame, read_frame
 from gpi_hammerstein.io.npy import read_npy_pair
 from gpi_hammerstein.io.recording import Recording, Run
+from gpi_hammerstein.io.roles import Roles, assign_roles
+from gpi_hammerstein.io.swapped import swapped_note
 from gpi_hammerstein.io.tables import Table
 
 # The seconds since 1970 have this value in the year 5138; larger stamps are in another unit.
 LATEST_SECOND = 1e11
+# Rates are the same if they differ by less than this part, which rounded stamps can cause.
+SAME_RATE = 0.01
 
 PathLike = str | os.PathLike[str]
 Names = str | Sequence[str]
@@ -43,22 +47,24 @@ def read_record(
     ----------
     path
         A file, or a list of files with the same columns, whose experiments are put in one record. Formats are
-        CSV (``.csv``, ``.csv.gz``, also separated by semicolons or tabs), Parquet (``.parquet``), NumPy
-        (``.npz``, ``.npy``) and MATLAB v4, v5 or v7.3 (``.mat``). Arrays in NumPy and MATLAB files have
-        the shape (samples,), (samples, channels), (samples, channels, realisations) or (samples, channels,
+        CSV (``.csv``, ``.csv.gz``, also separated by semicolons, tabs or spaces), Excel (``.xlsx``), Parquet
+        (``.parquet``), NumPy (``.npz``, ``.npy``), MATLAB v4, v5 or v7.3 (``.mat``), HDF5 (``.h5``), LabVIEW
+        (``.lvm``, ``.tdms``) and MDF (``.mf4``). Excel, TDMS and MDF need the extras ``xlsx``, ``tdms`` and
+        ``mdf``. Arrays in NumPy, MATLAB and HDF5 files have the shape (samples,), (samples, channels), (samples, channels, realisations) or (samples, channels,
         realisations, periods). Every realisation is an experiment; all of its periods except the last one are
         warm-up. A Polars or pandas data frame or an xarray dataset, with columns named as in a CSV file, is
         also accepted.
     input, output, covariate
         Names of the columns with or without their unit: ``"u_V"`` or ``"u"``. If they are not given, columns
-        are recognised by their names. Inputs: ``u``, ``u1``, ``input``, else ``voltage``, ``drive``,
-        ``command``. Outputs: ``y``, ``y1``, ``output``, else ``position``, ``displacement``. Every other
-        column is a covariate (``covariate=[]`` ignores them). A ``.npy`` file contains only the input;
+        are recognised by words in their names and by their units, and a note says why. Inputs: ``u``, ``u1``,
+        ``input``, else words such as ``voltage``, ``drive``, ``command``. Outputs: ``y``, ``y1``, ``output``, else
+        words such as ``position``, ``sensor``. Every other
+        column with only numbers is a covariate (``covariate=[]`` ignores them). A ``.npy`` file contains only the input;
         `output` is then the path of the file with the output. For several ``.npy`` files, give one output
         file for each of them.
     time
-        Name of the time column; ``t`` and ``time`` are recognised. The unit is the text after the last
-        underscore (``t_ms``); without a unit, it is s.
+        Name of the time column; ``t``, ``time`` and similar names are recognised. The unit is part of the name
+        (``t_ms``, ``Time (ms)``); without a unit, it is s. Dates and times of day are converted to seconds.
     rate
         Sampling rate in Hz; it replaces the time column.
     warmup
@@ -67,7 +73,7 @@ def read_record(
     resample
         A rate in Hz, or True (or ``"auto"``) for the rate of the median step. Makes non-uniform sampling
         uniform by linear interpolation, and cuts the record into several experiments at gaps and where the
-        clock jumps back.
+        clock jumps back. Rows in which a used column has no number are left out.
     experiment
         Experiments to keep, numbered from 0: ``3``, ``[0, 2]``, ``"0-4,7"``.
 
@@ -92,8 +98,8 @@ def read_record(
     ``GPI_MAX_READ_BYTES`` (1073741824), the size of the data of one file after decompression;
     ``GPI_MAX_READ_RATIO`` (100), the ratio of this size to the size of the file, if the data has more than
     16 MiB; ``GPI_MAX_READ_COLUMNS`` (1000), the number of columns or variables of one file;
-    ``GPI_MAX_READ_SECONDS`` (120), the time for a Parquet or HDF5 file. These two formats are read in another
-    process, because their libraries can end a process if a file is corrupt. An HDF5 file that refers to other
+    ``GPI_MAX_READ_SECONDS`` (120), the time for a Parquet, HDF5, Excel, TDMS or MDF file. These formats are read
+    in another process, because their libraries can end a process or block it if a file is corrupt. An HDF5 file that refers to other
     files is refused.
 
     Examples
@@ -182,7 +188,10 @@ def read_recording(
                 covariates=_names(covariate),
                 need_time=rate is None and table.rate is None,
                 left_out=table.left_out,
+                unusable=table.unusable(),
             )
+            if covariate is None:
+                table, roles = _without_unusable(table, roles)
             parts.append(_read_part(table, roles, rate, resample, warmup))
     names = [str(one) if isinstance(one, Path) else "the data frame" for one in sources]
     return _join(parts, names).select(experiment)
@@ -192,18 +201,32 @@ def _names(names: Names | None) -> list[str] | None:
     return None if names is None else [names] if isinstance(names, str) else list(names)
 
 
+def _without_unusable(table: Table, roles: Roles) -> tuple[Table, Roles]:
+    """Leave out columns that nobody has named and that contain no numbers: they are not judged."""
+    unusable = table.unusable()
+    left_out = {column.header: unusable[column] for column in roles.covariates if column in unusable}
+    kept = [column for column in roles.covariates if column.header not in left_out]
+    return replace(table, left_out=table.left_out | left_out), replace(roles, covariates=kept)
+
+
 def _read_part(
     table: Table, roles: Roles, rate: float | None, resample: bool | float | str | None, warmup: int | None
 ) -> Recording:
     """Divide one table into experiments."""
     signals = [*roles.inputs, *roles.outputs, *roles.covariates]
-    table.require_numbers(signals)
-    samples = table.stack(signals)
-    pieces, notes, starts = [samples], [*table.notes], [0.0]
+    used = signals if roles.time is None or rate is not None else [roles.time, *signals]
+    notes = [*table.notes, *roles.notes()]
     notes += [f"`{name}` is left out: it contains {what}" for name, what in table.left_out.items()]
+    if resample and roles.time is not None:
+        whole = table.complete_rows(used)
+        if whole.any() and not whole.all():
+            notes.append(f"{np.count_nonzero(~whole)} rows are left out, in which a used column has no number")
+            table = replace(table, columns={column: x[whole] for column, x in table.columns.items()})
+    table.require_numbers(used, has_clock=roles.time is not None and rate is None)
+    samples = table.stack(signals)
+    pieces, starts = [samples], [0.0]
     given = rate or table.rate
     if roles.time is not None and rate is None:
-        table.require_numbers([roles.time])
         stamps = table.columns[roles.time] * TIME_UNITS.get(roles.time.unit, 1.0)
         if resample:
             if isinstance(resample, str) and resample != "auto":
@@ -231,6 +254,8 @@ def _read_part(
         raise ParameterError(
             f"`resample`: {table.source} has no time stamps, which resampling needs; give the rate (--rate)"
         )
+    elif rate is not None:
+        notes += _other_rate(table, roles, rate)
     assert given is not None  # assign_roles requires a time column otherwise
     if not (np.isfinite(given) and given > 0):
         raise DataError(
@@ -249,7 +274,25 @@ def _read_part(
         )
         for piece, start in zip(pieces, starts, strict=True)
     ]
-    return Recording(runs, given, roles.inputs, roles.outputs, roles.covariates, notes)
+    notes += swapped_note(runs, roles)
+    return Recording(
+        runs, given, roles.inputs, roles.outputs, roles.covariates, notes, roles.undecided, roles.why
+    )
+
+
+def _other_rate(table: Table, roles: Roles, rate: float) -> list[str]:
+    """Return a note if the file itself has another rate than the one that is given."""
+    stated = table.rate
+    if roles.time is not None and roles.time in table.columns:
+        stamps = table.columns[roles.time] * TIME_UNITS.get(roles.time.unit, 1.0)
+        steps = np.diff(stamps[np.isfinite(stamps)])
+        whole = not roles.time.unit and (stamps == np.rint(stamps)).all()  # a counter states no rate
+        usual = float(np.median(steps)) if steps.size and not whole else 0.0
+        stated = 1.0 / usual if usual > 0 else None
+    if stated is None or abs(stated - rate) <= SAME_RATE * rate:
+        return []
+    where = "the file" if roles.time is None else f"`{roles.time.header}`"
+    return [f"{where} says {stated:.6g} Hz, but --rate {rate:g} is used; omit it to use the rate of {where}"]
 
 
 def _join(parts: Sequence[Recording], sources: Sequence[str]) -> Recording:
