@@ -81,7 +81,7 @@ def _split_unit(header: str) -> tuple[str, str]:
         if is_unit(found[2]):
             return found[1].rstrip(" ,;:-"), found[2]
     if found := re.fullmatch(r"(.*[^\W_])/(\S+)", header):
-        if is_unit(found[2]) and found[1] not in UNITS:
+        if is_unit(found[2]) and not is_unit(header):
             return found[1], found[2]
     return header, ""
 

@@ -39,6 +39,8 @@ class _Start:
     """The first row of numbers."""
     headers: list[str]
     separator: str
+    has_units: bool = False
+    """Whether the line below the names contains the units."""
 
     def top(self) -> int:
         """Return the first line that belongs to the table."""
@@ -81,6 +83,8 @@ def find_header(text: str) -> Header | None:
     if not lines:
         return None
     numbers = _first_numbers(lines, SEPARATORS)
+    if numbers is None:  # perhaps each row contains a text
+        numbers = _first_numbers(lines, SEPARATORS, alone=False)
     if numbers is None and any(_are_numbers(line.split()) for line in lines):
         return find_header("\n".join("\t".join(line.split()) for line in text.split("\n")))
     if numbers is None:
@@ -96,7 +100,7 @@ def find_header(text: str) -> Header | None:
     chosen = max(range(len(starts)), key=lambda place: (sizes[place], place))
     start, end = starts[chosen], ends[chosen]
     below = lines[start.first if start.names is None else start.names + 1 : end]
-    if start.names is not None and start.first - start.names == 2 and _are_units(_cells(below[0], start.separator)):
+    if start.has_units:
         below = below[1:]
     if chosen == len(starts) - 1:
         below.append(rest)
@@ -150,16 +154,17 @@ def _start(lines: Sequence[str], first: int, separator: str, remarks: dict[int, 
 
     if first in remarks and (found := named(remarks[first].lstrip("#% \t"))):
         return _Start(None, first, found, separator)
+    # Rows with some text can stand between the names and the first row of numbers alone; names contain no number.
     names = first - 1
+    while names > 0 and len(cells := _cells(lines[names], separator)) == len(row) and any(map(is_number, cells)):
+        names -= 1
     if names > 0 and _are_units(_cells(lines[names], separator)) and (found := named(lines[names - 1])):
         units = [cell.strip("[]() ") for cell in _cells(lines[names], separator)]
         units += [""] * (len(found) - len(units))
         headers = [f"{name} [{unit}]" if unit else name for name, unit in zip(found, units, strict=False)]
-        return _Start(names - 1, first, headers, separator)
-    # a row of text below the names is no line of names: the error is then found in that row
-    for place in dict.fromkeys((names, 0)):
-        if 0 <= place < first and (found := named(lines[place])):
-            return _Start(place, first, found, separator)
+        return _Start(names - 1, first, headers, separator, has_units=True)
+    if names >= 0 and (found := named(lines[names])):
+        return _Start(names, first, found, separator)
     return _Start(None, first, [f"column{place}" for place in range(1, len(row) + 1)], separator)
 
 
@@ -167,16 +172,18 @@ def _is_numbered(headers: Sequence[str]) -> bool:
     return list(headers) == [f"column{place}" for place in range(1, len(headers) + 1)]
 
 
-def _first_numbers(lines: Sequence[str], separators: str) -> tuple[int, str] | None:
-    """Find the first line with two or more numbers, and their separator."""
+def _first_numbers(lines: Sequence[str], separators: str, alone: bool = True) -> tuple[int, str] | None:
+    """Find the first line with two or more numbers, and their separator; `alone`: and without text."""
     for place, line in enumerate(lines):
         for separator in separators:
-            if _are_numbers(_cells(line, separator)):
+            if _are_numbers(_cells(line, separator), alone):
                 return place, separator
     return None
 
 
-def _are_numbers(cells: Sequence[str]) -> bool:
+def _are_numbers(cells: Sequence[str], alone: bool = True) -> bool:
+    if not alone:
+        return sum(map(is_number, cells)) > 1
     return len(cells) > 1 and any(cells) and all(not cell or is_number(cell) for cell in cells)
 
 

@@ -31,6 +31,7 @@ from gpi_hammerstein.io.tables import Table
 from gpi_hammerstein.io.text import decoded, table_of_text
 
 END = "***End_of_Header***"
+HEADER = "Channels"
 FIRST_LINE = "LabVIEW Measurement"
 UNITS = {"volts": "V", "volt": "V", "amps": "A", "amperes": "A", "meters": "m", "millimeters": "mm"}
 UNITS |= {"micrometers": "um", "nanometers": "nm", "seconds": "s", "degrees": "deg", "newtons": "N"}
@@ -74,17 +75,13 @@ def read_lvm(file: File) -> list[Table]:
     tables = []
     about: dict[str, list[str]] = {}
     for segment in segments:
-        lines = segment.lstrip("\n").split("\n")
-        while lines and not lines[-1].strip():
-            lines.pop()
-        # The lines above the next header follow the rows, below an empty line.
-        edge = max((place for place, line in enumerate(lines) if not line.strip(separator + " ")), default=-1)
-        rows, header = (lines, []) if edge < 0 else (lines[:edge], lines[edge + 1 :])
+        lines = segment.strip("\n").split("\n")
+        # A header begins with `Channels`; it ends the rows of the segment before it.
+        edge = next((k for k, line in enumerate(lines) if line.split(separator)[0] == HEADER), len(lines))
+        rows = [line for line in lines[:edge] if line.strip()]
         if rows and about:
             tables.append(_segment(rows, about, separator, file))
-        elif not about and not header:
-            header = rows
-        about = _settings(header, separator)
+        about = _settings(lines[edge:], separator)
     if not tables:
         raise DataError(f"{file.path}: no rows below `{END}`; a record has one row for each sample")
     return [

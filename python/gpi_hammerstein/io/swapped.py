@@ -12,6 +12,7 @@ those of a sensor and of a drive.
 """
 
 from collections.abc import Sequence
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +29,9 @@ LEADS = 0.01
 BLOCKS, AGREE = 10, 0.8
 # A signal is rougher than another one if the part of its power in third differences is this many times larger.
 ROUGHER = 10.0
-# A signal with a smaller part is smooth, as a generator writes it.
-SMOOTH = 1e-6
+# The roughness in fourth differences over that in third ones: 1 for white noise, the square of the phase step for a
+# smooth signal.
+NOISY, SMOOTH = 0.3, 0.1
 
 
 def lead(u: Array, y: Array) -> tuple[float, float]:
@@ -76,13 +78,15 @@ def centred(x: Array) -> Array:
     return x - x.mean()
 
 
-def roughness(x: Array) -> float:
-    """Return the part of the power of a signal that its third differences have: 1 for white noise.
+def roughness(x: Array, order: int = 3) -> float:
+    """Return the part of the power of a signal that its differences of an order have: 1 for white noise.
 
     Parameters
     ----------
     x
         The samples, (samples,).
+    order
+        The order of the differences.
 
     Examples
     --------
@@ -91,8 +95,25 @@ def roughness(x: Array) -> float:
     """
     x = centred(x)
     power = float(x @ x)
-    # The squares of the coefficients 1, -3, 3, -1 have the sum 20.
-    return float(np.sum(np.diff(x, 3) ** 2)) / 20.0 / power if power > 0 else 0.0
+    # The squares of the binomial coefficients, which white noise is multiplied by, have this sum.
+    return float(np.sum(np.diff(x, order) ** 2)) / comb(2 * order, order) / power if power > 0 else 0.0
+
+
+def flatness(x: Array) -> float:
+    """Return the roughness in fourth differences over that in third ones.
+
+    Parameters
+    ----------
+    x
+        The samples, (samples,).
+
+    Examples
+    --------
+    >>> flatness(np.sin(np.linspace(0, 6, 1000))) < 0.01
+    True
+    """
+    third = roughness(x)
+    return roughness(x, 4) / third if third > 0 else 0.0
 
 
 def signs_of_swapping(u: Array, y: Array, units: tuple[str, str]) -> list[str]:
@@ -120,8 +141,7 @@ def signs_of_swapping(u: Array, y: Array, units: tuple[str, str]) -> list[str]:
     correlation, agree = lead(u, y)
     if correlation > LEADS and agree >= AGREE:
         found.append("the output leads the input, but an actuator lags")
-    rough_u, rough_y = roughness(u), roughness(y)
-    if rough_y < SMOOTH and rough_u > ROUGHER * rough_y:
+    if flatness(u) > NOISY and flatness(y) < SMOOTH and roughness(u) > ROUGHER * roughness(y):
         found.append("the input contains noise, and the output is as smooth as a command")
     if units[0] in UNITS_OF["output"] and units[1] in UNITS_OF["input"]:
         found.append(f"the input is in {units[0]} and the output in {units[1]}")

@@ -69,7 +69,8 @@ def read_xlsx(file: File) -> list[Table]:
 
 def _lines(rows: Iterable[Iterable[Any]], file: File) -> tuple[list[str], int]:
     """Return the rows as text, and how many of them have two or more numbers."""
-    lines, numbers = [], 0
+    table: list[list[str]] = []
+    numbers = width = 0
     for row in rows:
         cells = list(row)
         while cells and cells[-1] is None:
@@ -78,8 +79,10 @@ def _lines(rows: Iterable[Iterable[Any]], file: File) -> tuple[list[str], int]:
         file.allowance.spend(CELL_BYTES * (len(cells) + 1))
         if cells:
             numbers += sum(isinstance(cell, int | float) for cell in cells) > 1
-            lines.append("\t".join(_texts(cells)))
-    return lines, numbers
+            table.append(list(_texts(cells)))
+            width = max(width, len(cells))
+    file.allowance.spend(width * len(table))
+    return ["\t".join(row + [""] * (width - len(row))) for row in table], numbers
 
 
 def _texts(cells: Iterable[Any]) -> Iterator[str]:
