@@ -154,9 +154,17 @@ def laboratory_files() -> Iterator[Seed]:
         run.create_dataset("sensor", data=columns["y_um"], chunks=(SAMPLES,), compression="gzip")
     yield Seed("HDF5", ".h5", stream.getvalue())
     lines = ["LabVIEW Measurement", "Separator\tTab", "Decimal_Separator\t,", "***End_of_Header***\t", ""]
-    lines += ["Channels\t2\t", "Y_Unit_Label\tVolts\tum\t", "Delta_X\t0,01\t0,01\t", "***End_of_Header***\t\t"]
+    lines += [
+        "Channels\t2\t",
+        "Y_Unit_Label\tVolts\tum\t",
+        "Delta_X\t0,01\t0,01\t",
+        "***End_of_Header***\t\t",
+    ]
     lines += ["X_Value\tDrive\tSensor\tComment"]
-    lines += ["\t".join(f"{value:.6f}".replace(".", ",") for value in row) for row in zip(*columns.values(), strict=True)]
+    lines += [
+        "\t".join(f"{value:.6f}".replace(".", ",") for value in row)
+        for row in zip(*columns.values(), strict=True)
+    ]
     yield Seed("LVM", ".lvm", "\r\n".join(lines).encode())
     for make in (workbook, tdms, mdf):
         with contextlib.suppress(ImportError):
@@ -212,7 +220,10 @@ def mdf(columns: dict[str, np.ndarray]) -> Seed:
     with asammdf.MDF(version="4.10") as file:
         file.start_time = datetime.datetime(2026, 1, 1, tzinfo=datetime.UTC)
         file.append(
-            [asammdf.Signal(samples=columns[name], timestamps=columns["t_s"], name=name) for name in ("u_V", "y_um")]
+            [
+                asammdf.Signal(samples=columns[name], timestamps=columns["t_s"], name=name)
+                for name in ("u_V", "y_um")
+            ]
         )
         file.save(stream)
     return Seed("MDF", ".mf4", stream.getvalue())

@@ -81,7 +81,9 @@ def test_a_guess_is_explained(tmp_path: Path) -> None:
 
 def test_an_undecided_output_is_told_where_it_is_needed(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
-    path.write_text("t_s,u_V,angle_deg,stroke_um\n" + "\n".join(f"{t},{u},{u},{u}" for t, u in zip(T, U, strict=True)))
+    path.write_text(
+        "t_s,u_V,angle_deg,stroke_um\n" + "\n".join(f"{t},{u},{u},{u}" for t, u in zip(T, U, strict=True))
+    )
     with pytest.raises(gpi.DataError, match="--output.*angle_deg, stroke_um"):
         gpi.read_record(path)
     assert gpi.read_record(path, output="stroke_um").output_names == ["stroke"]
@@ -142,7 +144,9 @@ def test_times_of_day_are_a_clock(layout: str, tmp_path: Path) -> None:
     begin = datetime.datetime(2026, 11, 2, 23, 59, 59, 800_000)  # midnight passes within the record
     stamps = [(begin + datetime.timedelta(seconds=float(t))).strftime(layout) for t in T]
     path = tmp_path / "r.csv"
-    path.write_text("Time,u_V,y_um\n" + "\n".join(f"{a},{u},{y}" for a, u, y in zip(stamps, U, Y, strict=True)))
+    path.write_text(
+        "Time,u_V,y_um\n" + "\n".join(f"{a},{u},{y}" for a, u, y in zip(stamps, U, Y, strict=True))
+    )
     is_the_record(path)
 
 

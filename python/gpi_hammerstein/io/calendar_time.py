@@ -1,11 +1,13 @@
 """Dates and times of day as seconds."""
 
+import re
+
 import numpy as np
 import polars as pl
 
 DAY = 86400.0
 # The first cell of a column of text that is tried as a time: hours and minutes, with or without a date.
-PATTERN = r"^\s*(\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T])?\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?Z?\s*$"
+PATTERN = re.compile(r"\s*(\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T])?\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?Z?\s*")
 DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y")
 """Orders of year, month and day; only differences are used."""
 
@@ -58,7 +60,7 @@ def _unit(kind: pl.DataType) -> float:
 def _parsed(series: pl.Series) -> pl.Series | None:
     """Return the times of a column of text; None if it contains something else."""
     first = series[0] if len(series) else None
-    if first is None or not pl.Series([first]).str.contains(PATTERN).item():
+    if first is None or not PATTERN.fullmatch(first):
         return None
     text = series.str.strip_chars().str.strip_suffix("Z").str.replace("T", " ", literal=True)
     text = text.str.replace(",", ".", literal=True)

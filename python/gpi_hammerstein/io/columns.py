@@ -62,7 +62,9 @@ def parse_header(header: str, array: str | None = None) -> Column:
         name, unit = found[1] or header, found[2].strip()
     else:
         name, unit = _split_unit(header)
-    return Column(header, name, unit.translate(SIGNS) if unit.translate(SIGNS) in UNITS else unit, array or header)
+    return Column(
+        header, name, unit.translate(SIGNS) if unit.translate(SIGNS) in UNITS else unit, array or header
+    )
 
 
 def _split_unit(header: str) -> tuple[str, str]:

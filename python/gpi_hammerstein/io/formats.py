@@ -46,7 +46,13 @@ FORMATS = {
     **dict.fromkeys((".mf4", ".mdf"), Format("MDF", read_mdf, always)),
 }
 # The starts of files that have the name of a text and are something else.
-DISGUISED = {b"PK\x03\x04": ".xlsx", b"\x89HDF": ".h5", b"TDSm": ".tdms", b"MDF  ": ".mf4", b"PAR1": ".parquet"}
+DISGUISED = {
+    b"PK\x03\x04": ".xlsx",
+    b"\x89HDF": ".h5",
+    b"TDSm": ".tdms",
+    b"MDF  ": ".mf4",
+    b"PAR1": ".parquet",
+}
 OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 NAMES = (
     "names of record files end in .csv, .csv.gz, .txt, .xlsx, .parquet, .npz, .npy, .mat, .h5, .lvm, .tdms or "
@@ -101,7 +107,9 @@ def _require_format(file: File, chosen: Format) -> None:
         raise DataError(f"{file.path}: is a workbook of Excel, not a text; save the sheet as .xlsx or .csv")
     for start, suffix in DISGUISED.items():
         if file.data.startswith(start):
-            raise DataError(f"{file.path}: is no text file, but looks like {suffix}; rename it so that it ends in {suffix}")
+            raise DataError(
+                f"{file.path}: is no text file, but looks like {suffix}; rename it so that it ends in {suffix}"
+            )
 
 
 def output_files(paths: Sequence[Path], outputs: list[str] | None) -> dict[Path, Path | None]:

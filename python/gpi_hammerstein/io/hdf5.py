@@ -108,10 +108,16 @@ def read_plain_hdf5(file: File) -> list[Table]:
             if isinstance(item, h5py.Group):
                 for name in item:
                     if not isinstance(item.get(name, getlink=True), h5py.HardLink):
-                        raise ValueError(f"`{name}` is a link to another object or file, which is not followed")
+                        raise ValueError(
+                            f"`{name}` is a link to another object or file, which is not followed"
+                        )
                     pending.append((f"{path}/{name}" if path else name, item[name]))
             elif isinstance(item, h5py.Dataset):
-                if item.dtype.names and item.ndim == 1 and all(item.dtype[n].kind in "fiub" for n in item.dtype.names):
+                if (
+                    item.dtype.names
+                    and item.ndim == 1
+                    and all(item.dtype[n].kind in "fiub" for n in item.dtype.names)
+                ):
                     _require_inside(item, path)
                     file.allowance.spend(item.size * item.dtype.itemsize)
                     values = item[()]
@@ -119,7 +125,9 @@ def read_plain_hdf5(file: File) -> list[Table]:
                 else:
                     unit = _text(item.attrs.get("units", item.attrs.get("unit", "")))
                     found[f"{path} [{unit}]" if unit else path] = _array(item, path, file, axes=1)
-    return from_arrays(_short(found) | {name: value for name, value in scalars.items() if name not in found}, file)
+    return from_arrays(
+        _short(found) | {name: value for name, value in scalars.items() if name not in found}, file
+    )
 
 
 def _rates(item: Any) -> dict[str, float]:

@@ -156,7 +156,9 @@ def _start(lines: Sequence[str], first: int, separator: str, remarks: dict[int, 
         return _Start(None, first, found, separator)
     # Rows with some text can stand between the names and the first row of numbers alone; names contain no number.
     names = first - 1
-    while names > 0 and len(cells := _cells(lines[names], separator)) == len(row) and any(map(is_number, cells)):
+    while (
+        names > 0 and len(cells := _cells(lines[names], separator)) == len(row) and any(map(is_number, cells))
+    ):
         names -= 1
     if names > 0 and _are_units(_cells(lines[names], separator)) and (found := named(lines[names - 1])):
         units = [cell.strip("[]() ") for cell in _cells(lines[names], separator)]

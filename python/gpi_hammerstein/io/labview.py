@@ -105,7 +105,9 @@ def _segment(rows: Sequence[str], about: dict[str, list[str]], separator: str, f
         if name.strip().lower() == COMMENT:
             continue
         is_clock = name.strip().lower().startswith("x_value")
-        unit = ("s" if about.get("X_Dimension", ["Time"])[0] == "Time" else "") if is_clock else next(units, "")
+        unit = (
+            ("s" if about.get("X_Dimension", ["Time"])[0] == "Time" else "") if is_clock else next(units, "")
+        )
         shown = parse_header(name)
         headers.append(f"{shown.header} [{unit}]" if unit and not shown.unit else shown.header)
         kept.append(place)
@@ -190,7 +192,9 @@ def read_tdms(file: File) -> list[Table]:
         if arrays.keys() != chosen.keys():
             continue
         for table in from_arrays(arrays, file):
-            tables.append(replace(table, source=f"{table.source} (group {name})") if len(groups) > 1 else table)
+            tables.append(
+                replace(table, source=f"{table.source} (group {name})") if len(groups) > 1 else table
+            )
     ignored = [name for name, arrays in groups if arrays.keys() != chosen.keys()]
     if ignored:
         note = f"other groups are left out, because they have other channels: {', '.join(ignored)}"

@@ -43,7 +43,9 @@ def name_by_content(table: Table) -> Table:
     if len(moving) != 2:
         return replace(table, notes=[*table.notes, f"{note} column1, column2, .."])
     named = dict(zip(["t"] * len(clock) + ["u", "y"], [*clock, *moving], strict=True))
-    renamed = {old: Column(old.header, name, "s" if name == "t" else "", old.array) for name, old in named.items()}
+    renamed = {
+        old: Column(old.header, name, "s" if name == "t" else "", old.array) for name, old in named.items()
+    }
     what = ", ".join(f"{old.header} is taken as {ROLES[name]}" for name, old in named.items())
     return replace(
         table,

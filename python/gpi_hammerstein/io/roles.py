@@ -41,7 +41,9 @@ class Roles:
             for column in columns:
                 why = self.why.get(column.header, "")
                 if why and "it is named" not in why:
-                    found.append(f"`{column.header}` is taken as the {role}: {why}; --{role} names another column")
+                    found.append(
+                        f"`{column.header}` is taken as the {role}: {why}; --{role} names another column"
+                    )
         return found
 
 
@@ -184,7 +186,8 @@ def assign_roles(
         why |= found.why
         taken += found.columns
     if not given["input"]:
-        raise DataError(_no_input(source, there, given, rivals))
+        free = [c for c in columns if c not in taken and score(c, "output")[0] > ONLY_UNIT]
+        raise DataError(_no_input(source, there, given, rivals, free))
     if not given["time"] and need_time:
         raise DataError(
             f"{source}: no time column; name one with time= (--time) or give the sampling rate in Hz "
@@ -202,7 +205,11 @@ def assign_roles(
 
 
 def _no_input(
-    source: str, there: str, given: Mapping[str, list[Column]], rivals: Mapping[str, list[Column]]
+    source: str,
+    there: str,
+    given: Mapping[str, list[Column]],
+    rivals: Mapping[str, list[Column]],
+    others_free: Sequence[Column],
 ) -> str:
     """Return what to do if no column was recognised as an input."""
     others = [
@@ -218,4 +225,9 @@ def _no_input(
     if undecided := rivals.get("input"):
         names = ", ".join(column.header for column in undecided)
         text += f". Each of these may be the input: {names}"
+    if len(given["output"]) == 1 and len(others_free) == 1:
+        text += (
+            f". If a motion is imposed and its effect is measured, use --input {given['output'][0].header} "
+            f"--output {others_free[0].header}"
+        )
     return text

@@ -133,7 +133,9 @@ def _unique(names: list[str], source: str) -> tuple[list[str], list[str]]:
             unique += f".{place}"
         found[unique] = None
     repeated = [name for name, times in counts.items() if times > 1]
-    notes = [f"{counts[name]} columns are named `{name}`; a number was added to the others" for name in repeated]
+    notes = [
+        f"{counts[name]} columns are named `{name}`; a number was added to the others" for name in repeated
+    ]
     return list(found), notes
 
 

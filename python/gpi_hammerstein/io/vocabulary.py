@@ -22,6 +22,7 @@ temperature, trigger) has the score zero.
 
 import re
 import unicodedata
+from functools import lru_cache
 
 from gpi_hammerstein.io.columns import TIME_UNITS, Column
 
@@ -36,12 +37,21 @@ EXACTLY = 10
 _WORDS: dict[str, list[tuple[int, str]]] = {
     "time": [(4, "t time zeit zeitstempel timestamp temps tiempo tempo elapsed sekunden seconds xvalue")],
     "input": [
-        (4, "u in input eingang command cmd drive driver stell ansteuer generator waveform excitation anregung ao dac"),
-        (3, "voltage volt spannung tension current strom pressure druck motor actuator aktor aktuator amplifier"),
+        (
+            4,
+            "u in input eingang command cmd drive driver stell ansteuer generator waveform excitation anregung ao dac",
+        ),
+        (
+            3,
+            "voltage volt spannung tension current strom pressure druck motor actuator aktor aktuator amplifier",
+        ),
         (2, "reference ref setpoint desired target demand soll wanted"),
     ],
     "output": [
-        (4, "y out output ausgang sensor cap capacitive kapazitiv lvdt encoder interferometer laser probe gauge"),
+        (
+            4,
+            "y out output ausgang sensor cap capacitive kapazitiv lvdt encoder interferometer laser probe gauge",
+        ),
         (4, "measured measurement mess gemessen ist response antwort ai adc readback"),
         (3, "position pos displacement disp deflection weg auslenkung hub stroke travel strain dehnung"),
         (3, "angle winkel force kraft"),
@@ -100,6 +110,7 @@ def score(column: Column, role: str) -> tuple[int, str]:
     return points, " and ".join(reasons)
 
 
+@lru_cache(maxsize=1 << 15)
 def words_of(name: str) -> str:
     """Return the words of a name, separated by spaces, in lower case and without accents and digits.
 

@@ -58,7 +58,9 @@ def read_xlsx(file: File) -> list[Table]:
         sheet.reset_dimensions()  # the size that a sheet claims can be anything
         sheets[sheet.title], counts[sheet.title] = _lines(sheet.iter_rows(values_only=True), file)
     if not any(counts.values()):
-        raise DataError(f"{file.path}: no sheet contains rows of numbers; a record has one row for each sample")
+        raise DataError(
+            f"{file.path}: no sheet contains rows of numbers; a record has one row for each sample"
+        )
     chosen = max(counts, key=lambda title: counts[title])
     table = table_of_text("\n".join(sheets[chosen]), file)
     if len(sheets) > 1:
