@@ -43,6 +43,8 @@ class Recording:
     """Columns of which each may be the output, so that none was taken."""
     why: dict[str, str] = field(default_factory=dict)
     """Why each guessed column was taken for its role, by its header."""
+    time: Column | None = None
+    """The column of the time; None if there is none or the rate was given."""
 
     def record(self) -> Record:
         """Return the record for the identification.

@@ -1,0 +1,5 @@
+"""What a record file contains, what a model of it can and cannot determine, and which command to run next."""
+
+from gpi_hammerstein.inspection.inspection import Inspection, inspect
+
+__all__ = ["Inspection", "inspect"]

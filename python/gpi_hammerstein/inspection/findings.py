@@ -1,0 +1,122 @@
+"""What is wrong or remarkable in a record."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gpi_hammerstein._native import DataError, Record, signs
+from gpi_hammerstein.inspection.columns import resolution
+
+# Levels of an output below which its resolution limits a model. By hand: 0.1 % of the range.
+FEW_LEVELS = 1000
+# Part of the samples at a limit that is worth a sentence, as in the search for missing effects.
+CLIPPED = 0.005
+# Samples that a model of hysteresis and dynamics needs at least. By hand.
+FEW_SAMPLES = 500
+# Squared correlation below which an output seems not to belong to the input.
+UNRELATED = 0.01
+
+
+def shown(record: Record) -> dict[str, Any]:
+    """Return what a record shows without a model; values are None where it is too short.
+
+    Parameters
+    ----------
+    record
+        The record.
+
+    Returns
+    -------
+    dict
+        ``fed_back``, ``clipped`` and ``excitation_order`` of the compiled module.
+
+    Examples
+    --------
+    >>> shown(gpi.Record([0.0, 1.0], [0.0, 1.0], rate=1.0))["excitation_order"]  # doctest: +SKIP
+    """
+    try:
+        return dict(signs(record))
+    except DataError:
+        return {
+            "fed_back": [False] * len(record.input_names),
+            "clipped": [0.0] * len(record.output_names),
+            "excitation_order": 1,
+        }
+
+
+def findings(record: Record, found: dict[str, Any]) -> list[str]:
+    """Return sentences on what is wrong or remarkable in a record.
+
+    Parameters
+    ----------
+    record
+        The record.
+    found
+        What :func:`shown` returns.
+
+    Returns
+    -------
+    list of str
+        Sentences; none if nothing is remarkable.
+
+    Examples
+    --------
+    >>> u = np.sin(0.1 * np.arange(2000))
+    >>> record = gpi.Record(u, np.minimum(u, 0.5), rate=100.0)  # doctest: +SKIP
+    >>> findings(record, shown(record))[0][:20]  # doctest: +SKIP
+    'The output y stands '
+    """
+    sentences = []
+    if record.samples < FEW_SAMPLES:
+        sentences.append(
+            f"The record has only {record.samples} samples; a model of hysteresis and dynamics needs about "
+            f"{FEW_SAMPLES}."
+        )
+    for index, name in enumerate(record.input_names):
+        u = np.concatenate([run[:, index] for run in record.u])
+        if np.ptp(u) == 0:
+            sentences.append(f"The input {name} is constant, so that nothing can be identified from it.")
+        if found["fed_back"][index]:
+            sentences.append(
+                f"The input {name} depends on past outputs, as under feedback: a model of it is biased. Record in "
+                "open loop, or take the reference of the controller as the input."
+            )
+    for index, name in enumerate(record.output_names):
+        y = np.concatenate([run[:, index] for run in record.y])
+        sentences += _of_output(name, record.output_units[index], y, found["clipped"][index])
+        if len(record.input_names) == 1 and np.ptp(y) > 0:
+            u = np.concatenate([run[:, 0] for run in record.u])
+            if np.ptp(u) > 0 and _similar(u, y) < UNRELATED:
+                sentences.append(
+                    f"The output {name} hardly follows the input: a straight line explains "
+                    f"{100 * _similar(u, y):.2g} % of its variance. Check that the columns belong together."
+                )
+    return sentences
+
+
+def _of_output(name: str, unit: str, y: "np.ndarray[Any, np.dtype[np.float64]]", clipped: float) -> Sequence[str]:
+    sentences = []
+    span = float(np.ptp(y))
+    if span == 0:
+        return [f"The output {name} is constant, so that nothing can be identified from it."]
+    if clipped > CLIPPED:
+        sentences.append(
+            f"The output {name} stands at its largest or smallest value for {100 * clipped:.2g} % of the samples "
+            "while the input moves: the sensor saturates there. Reduce the amplitude or the gain of the sensor."
+        )
+    step = resolution(y)
+    if step is not None and span / step < FEW_LEVELS:
+        sentences.append(
+            f"The output {name} is quantised in steps of {step:.3g} {unit}".rstrip()
+            + f", {round(span / step)} over its range: no model can be more accurate than about "
+            f"{step / np.sqrt(12):.2g} {unit}".rstrip()
+            + " rms."
+        )
+    return sentences
+
+
+def _similar(u: "np.ndarray[Any, np.dtype[np.float64]]", y: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
+    """Return the squared correlation of two signals."""
+    a, b = (u - u.mean()) / np.ptp(u), (y - y.mean()) / np.ptp(y)
+    return float((a @ b) ** 2 / ((a @ a) * (b @ b)))
