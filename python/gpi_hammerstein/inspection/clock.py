@@ -21,8 +21,9 @@ def facts_of_clock(stamps: Array) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``median_step_s``, ``smallest_step_s``, ``largest_step_s``, ``gaps`` (steps of more than ten median steps),
-        ``backward`` (steps back in time), ``repeated`` (rows with the stamp of the row above), ``duration_s``.
+        ``median_step_s``, ``smallest_step_s``, ``largest_step_s``, ``gaps`` (steps of more than ten median
+        steps), ``backward`` (steps back in time), ``repeated`` (rows with the stamp of the row above),
+        ``duration_s``.
 
     Examples
     --------

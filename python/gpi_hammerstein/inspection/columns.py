@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 SAME = 1e-9
 # A signal is called quantised if a sample in this number of samples is not at a level of its own.
 REPEATED = 4
+# A step is a multiple of the smallest one within this part of it, and this part of the steps must be. By
+# hand.
+UNEVEN, MOSTLY = 0.05, 0.9
 
 
 def facts_of_columns(table: Table, recording: Recording | None) -> list[dict[str, Any]]:
@@ -92,7 +95,10 @@ def _range(samples: Array) -> dict[str, Any]:
 
 
 def resolution(samples: Array) -> float | None:
-    """Return the usual distance of neighbouring levels of a signal.
+    """Return the distance of the levels of a quantised signal.
+
+    The distances of neighbouring levels of a quantised signal are multiples of the smallest one. Levels of a
+    smooth signal that repeats are not.
 
     Parameters
     ----------
@@ -102,7 +108,7 @@ def resolution(samples: Array) -> float | None:
     Returns
     -------
     float
-        The distance; None if nearly every sample has a level of its own, so that no step is visible.
+        The distance; None if nearly every sample has a level of its own, or the levels are no multiples.
 
     Examples
     --------
@@ -117,6 +123,7 @@ def resolution(samples: Array) -> float | None:
     steps = steps[steps > SAME * span]
     if not steps.size or (steps.size + 1) * REPEATED > len(samples):
         return None
-    return float(f"{np.median(steps):.6g}")
-
-
+    multiples = steps / steps.min()
+    if np.mean(np.abs(multiples - np.rint(multiples)) < UNEVEN) < MOSTLY:
+        return None
+    return float(f"{steps.min():.6g}")

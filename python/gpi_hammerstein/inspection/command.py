@@ -71,7 +71,7 @@ def experiment(answers: Sequence[Answer], found: Excitation, rate: float, unit: 
     Examples
     --------
     >>> from gpi_hammerstein.inspection.excitation import Excitation
-    >>> once = Excitation(0.0, 10.0, (1.0, 1.0), 1, 10.0, 1, 2, 1.0, 0.0, None)
+    >>> once = Excitation(0.0, 10.0, (1.0, 1.0), 1, 10.0, 1, 1.0, 0.0, None)
     >>> experiment([Answer("hysteresis", "no", "", "triangle")], once, 1000.0, "V")["command"]
     'gpi excite triangle --rate 1000 --duration 60 --frequency 0.3333 --range 0 10 --unit V -o next.csv'
     """

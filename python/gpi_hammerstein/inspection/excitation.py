@@ -1,9 +1,10 @@
 """What an input excites: band, turning points, speeds, holds and periods.
 
 A swing is the part of the input between two turning points; a turning point counts if the input moves back by
-more than a part of its span, so that noise and small lines of a multisine do not count. A play of half-width r
-opens only if a swing is longer than 2 r: the largest swing limits the half-widths, and swings of several lengths
-or turning points at several levels determine nested loops.
+more than a part of its span. Small and fast swings can ride on large and slow ones, so that swings are
+counted with several such parts, as in rainflow counting. A play of half-width r opens only if a swing is
+longer than 2 r: the largest swing limits the half-widths, and swings of several lengths determine nested
+loops.
 """
 
 from collections.abc import Sequence
@@ -14,12 +15,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Part of the span by which an input must return before a turning point counts. By hand: noise of a measured
-# drive is below.
-TURN = 0.02
-# Lengths of swings, and levels of turning points, are the same within this part of the span.
+# Parts of the span by which an input must return before a turning point counts. By hand: noise of a measured
+# drive is below the first one.
+TURNS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7)
+# Lengths of swings are the same within this part of the span.
 LEVEL = 0.05
-# Swings longer than this part of the span are compared by their speeds.
+# The part of the span with which the swings are found that are counted and whose speeds are compared: one of
+# the above.
 LONG = 0.2
 # Part of the power that may lie beyond the band that is reported.
 OUTSIDE = 0.01
@@ -28,7 +30,8 @@ STILL = 1e-3
 # Correlation of an input with itself, one period later, from which it is called periodic; noise of a measured
 # drive takes about 1e-3.
 PERIODIC = 0.995
-# Samples that the search for turning points looks at; a longer input is divided into blocks, whose extremes stay.
+# Samples that the search for turning points looks at; a longer input is divided into blocks, whose extremes
+# stay.
 MOST = 200_000
 
 
@@ -41,11 +44,10 @@ class Excitation:
     band_hz: tuple[float, float]
     """Frequencies between which nearly all of the power lies, without the mean."""
     swings: int
+    """Swings between turning points after which the input moves back by more than a fifth of its span."""
     largest_swing: float
     lengths: int
     """Different lengths of swings."""
-    levels: int
-    """Different levels of turning points."""
     speeds: float
     """Ratio of the fast to the slow long swings (90th to 10th percentile); 1 for one speed."""
     longest_hold_s: float
@@ -83,27 +85,27 @@ def excitation(experiments: Sequence[Array], rate: float) -> Excitation:
     low, high = min(float(u.min()) for u in experiments), max(float(u.max()) for u in experiments)
     span = high - low
     if not span > 0:
-        return Excitation(low, high, (0.0, 0.0), 0, 0.0, 0, 0, 1.0, 0.0, None)
-    lengths, speeds, levels = [], [], []
+        return Excitation(low, high, (0.0, 0.0), 0, 0.0, 0, 1.0, 0.0, None)
+    lengths, speeds, count = [], [], 0
     for u in experiments:
-        places = turning_points(u, TURN * span)
-        values, times = u[places], places / rate
-        # what comes before the first turning point and after the last one is no whole swing
-        lengths += np.abs(np.diff(values)).tolist()
-        speeds += (np.abs(np.diff(values)) / np.diff(times)).tolist()
-        levels += values.tolist()
+        for part in TURNS:
+            places = turning_points(u, part * span)
+            # what comes before the first turning point and after the last one is no whole swing
+            found = np.abs(np.diff(u[places]))
+            lengths += found.tolist()
+            if part == LONG:
+                count += len(found)
+                speeds += (found * rate / np.diff(places)).tolist()
     swings = np.asarray(lengths)
-    fast = np.asarray(speeds)[swings > LONG * span]
-    slow, quick = np.percentile(fast, [10, 90]) if fast.size > 1 else (1.0, 1.0)
+    slow, quick = np.percentile(speeds, [10, 90]) if len(speeds) > 1 else (1.0, 1.0)
     longest = max(experiments, key=len)
     return Excitation(
         low,
         high,
         band(longest, rate),
-        len(swings),
+        count,
         float(swings.max()) if swings.size else span,
         clusters(swings, LEVEL * span),
-        clusters(np.asarray(levels), LEVEL * span),
         float(quick / slow) if slow > 0 else 1.0,
         max(longest_hold(u, STILL * span) for u in experiments) / rate,
         period(longest, rate),
@@ -274,5 +276,7 @@ def period(u: Array, rate: float) -> float | None:
     if later[place] <= PERIODIC:
         return None
     # the largest value of the peak that begins here
-    end = place + int(np.argmax(later[place:] <= PERIODIC)) if (later[place:] <= PERIODIC).any() else len(later)
+    end = (
+        place + int(np.argmax(later[place:] <= PERIODIC)) if (later[place:] <= PERIODIC).any() else len(later)
+    )
     return float(below[0] + place + int(np.argmax(later[place:end]))) / rate

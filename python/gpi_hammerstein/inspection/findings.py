@@ -4,9 +4,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gpi_hammerstein._native import DataError, Record, signs
 from gpi_hammerstein.inspection.columns import resolution
+from gpi_hammerstein.io.columns import parse_header
+from gpi_hammerstein.io.vocabulary import score
+
+Array = NDArray[np.float64]
 
 # Levels of an output below which its resolution limits a model. By hand: 0.1 % of the range.
 FEW_LEVELS = 1000
@@ -95,7 +100,34 @@ def findings(record: Record, found: dict[str, Any]) -> list[str]:
     return sentences
 
 
-def _of_output(name: str, unit: str, y: "np.ndarray[Any, np.dtype[np.float64]]", clipped: float) -> Sequence[str]:
+def set_points(record: Record) -> list[str]:
+    """Return a sentence on each other column whose name is that of a set point.
+
+    Parameters
+    ----------
+    record
+        The record.
+
+    Returns
+    -------
+    list of str
+        Sentences.
+
+    Examples
+    --------
+    >>> set_points(record)  # doctest: +SKIP
+    []
+    """
+    named = [name for name in record.covariate_names if score(parse_header(name), "input")[0]]
+    return [
+        f"The column {name} looks like a command or a set point. If a controller computes {record.input_names[0]} from it, "
+        "the input is fed back, and a model of it is biased. If it is no measured influence, ignore it with "
+        "--covariate none."
+        for name in named
+    ]
+
+
+def _of_output(name: str, unit: str, y: Array, clipped: float) -> Sequence[str]:
     sentences = []
     span = float(np.ptp(y))
     if span == 0:
@@ -116,7 +148,7 @@ def _of_output(name: str, unit: str, y: "np.ndarray[Any, np.dtype[np.float64]]",
     return sentences
 
 
-def _similar(u: "np.ndarray[Any, np.dtype[np.float64]]", y: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
+def _similar(u: Array, y: Array) -> float:
     """Return the squared correlation of two signals."""
     a, b = (u - u.mean()) / np.ptp(u), (y - y.mean()) / np.ptp(y)
     return float((a @ b) ** 2 / ((a @ a) * (b @ b)))

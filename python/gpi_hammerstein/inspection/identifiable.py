@@ -2,15 +2,18 @@
 
 The rules follow from the model and need no fit:
 
-- A play of half-width r moves its output only if a swing of the input is longer than 2 r. Half-widths up to half
+- A play of half-width r moves its output only if a swing of the input is longer than 2 r. Half-widths up to
+half
   the largest swing are determined; swings between the same two levels determine one loop only, because every
   combination of plays with this loop is equal there.
 - A linear system of order n has 2 n parameters, and needs as large an order of persistent excitation. It is
   determined where the input has power, and a sampled response shows nothing above half the sampling rate.
-- A slow lag with the time constant T has reached 63 % of its response after T: a record of the duration D shows
+- A slow lag with the time constant T has reached 63 % of its response after T: a record of the duration D
+shows
   time constants up to about D / 3, and the fastest lag that is not part of the linear dynamics takes some
   samples.
-- An effect of the speed of the input needs equal swings at several speeds, and an effect of its amplitude needs
+- An effect of the speed of the input needs equal swings at several speeds, and an effect of its amplitude
+needs
   several amplitudes: otherwise it is the same as another curve.
 """
 
@@ -18,8 +21,8 @@ from dataclasses import dataclass
 
 from gpi_hammerstein.inspection.excitation import Excitation
 
-# Swings for a loop: with fewer, noise and the unknown initial state decide.
-SWINGS = 4
+# Whole swings for a loop: one in each direction.
+SWINGS = 2
 # Lengths of swings that determine nested loops. By hand: two lengths give two loops.
 NESTED = 3
 # Ratio of speeds that shows an effect of the speed. By hand.
@@ -30,8 +33,8 @@ AMPLITUDES = 2
 SLOWEST = 1 / 3
 # Samples of the fastest lag.
 FASTEST = 10.0
-# Durations in s from which slow effects are visible at all, and are told apart from a trend. By hand: creep of
-# piezo stacks has time constants from 0.1 s to some minutes.
+# Durations in s from which slow effects are visible at all, and are told apart from a trend. By hand: creep
+# of piezo stacks has time constants from 0.1 s to some minutes.
 SLOW, LONG = 3.0, 60.0
 # Time in s that the input must rest for creep to be seen alone.
 HOLD = 5.0
@@ -82,7 +85,7 @@ def answers(facts: Facts) -> list[Answer]:
     Examples
     --------
     >>> from gpi_hammerstein.inspection.excitation import Excitation
-    >>> slow = Excitation(0.0, 10.0, (1.0, 1.0), 20, 10.0, 1, 2, 1.0, 0.0, 1.0)
+    >>> slow = Excitation(0.0, 10.0, (1.0, 1.0), 20, 10.0, 1, 1.0, 0.0, 1.0)
     >>> found = answers(Facts(1000.0, 10.0, 1, [slow], 2, [], "V"))
     >>> [answer.what for answer in found if answer.possible == "no"]  # doctest: +ELLIPSIS
     ['rate dependence...
@@ -106,18 +109,11 @@ def _hysteresis(facts: Facts, found: Excitation) -> Answer:
     unit = f" {facts.input_unit}" if facts.input_unit else ""
     limit = f"half-widths up to {0.5 * found.largest_swing:.4g}{unit}, half the largest swing"
     if found.swings < SWINGS:
-        return Answer(
-            "hysteresis", "no", f"the input turns too rarely ({found.swings} whole swings)", "triangle"
-        )
+        return Answer("hysteresis", "no", f"the input turns too rarely for a loop", "triangle")
     if found.lengths < NESTED:
-        what = "one length" if found.lengths == 1 else f"{found.lengths} lengths"
-        return Answer(
-            "hysteresis",
-            "partly",
-            f"{limit}, but only along one loop: all {found.swings} swings have {what}",
-            "triangle",
-        )
-    return Answer("hysteresis", "yes", f"{limit}; {found.swings} swings of {found.lengths} lengths")
+        loops = "one loop, because all swings have one length" if found.lengths == 1 else "two loops"
+        return Answer("hysteresis", "partly", f"{limit}, but only along {loops}", "triangle")
+    return Answer("hysteresis", "yes", f"{limit}; the swings have {found.lengths} different lengths")
 
 
 def _dynamics(facts: Facts) -> Answer:
@@ -129,7 +125,7 @@ def _dynamics(facts: Facts) -> Answer:
         return Answer(
             what,
             "partly",
-            f"only at {seen}, up to {top:.3g} Hz (order of persistent excitation {facts.order})",
+            f"only at {seen}, up to {top:.3g} Hz",
             "multisine",
         )
     return Answer(what, "yes", f"up to about {top:.3g} Hz, where 99.5 % of the power of the input lies")
@@ -142,9 +138,12 @@ def _slow(facts: Facts, found: Excitation) -> Answer:
     if facts.duration < SLOW:
         return Answer(what, "no", f"the longest experiment takes only {facts.duration:.3g} s", "steps")
     if found.longest_hold_s >= HOLD or facts.duration >= LONG:
-        return Answer(
-            what, "yes", f"{lags}; the input rests for up to {found.longest_hold_s:.3g} s"
+        rests = (
+            f"; the input rests for up to {found.longest_hold_s:.3g} s"
+            if found.longest_hold_s >= HOLD
+            else ""
         )
+        return Answer(what, "yes", lags + rests)
     return Answer(
         what,
         "partly",
@@ -160,8 +159,7 @@ def _rate_dependence(found: Excitation) -> Answer:
     return Answer(
         what,
         "no",
-        f"the speeds of long swings differ only by a factor of {found.speeds:.3g}; repeat the same triangle at "
-        "three speeds",
+        f"all long swings have about the same speed (factor {found.speeds:.2f}); repeat one triangle at three speeds",
         "triangle",
     )
 
@@ -169,14 +167,16 @@ def _rate_dependence(found: Excitation) -> Answer:
 def _amplitude(found: Excitation) -> Answer:
     what = "curves (sensor, stiffness, butterfly)"
     if found.lengths >= AMPLITUDES:
-        return Answer(what, "yes", f"the swings have {found.lengths} lengths")
+        return Answer(what, "yes", f"the swings have {found.lengths} different lengths")
     return Answer(what, "partly", "all swings have one amplitude", "triangle")
 
 
 def _periodic(facts: Facts) -> Answer:
     what = "mains hum, other periodic disturbances"
     if facts.rate < 2 * MAINS:
-        return Answer(what, "no", f"mains frequency is above half the sampling rate, {0.5 * facts.rate:.4g} Hz")
+        return Answer(
+            what, "no", f"mains frequency is above half the sampling rate, {0.5 * facts.rate:.4g} Hz"
+        )
     low = PERIODS / facts.duration
     return Answer(what, "yes", f"from {low:.3g} Hz ({PERIODS:g} periods) to {0.5 * facts.rate:.4g} Hz")
 
@@ -184,7 +184,7 @@ def _periodic(facts: Facts) -> Answer:
 def _covariates(facts: Facts) -> Answer:
     what = "influence of temperature, load, .."
     if facts.covariates:
-        return Answer(what, "yes", f"of the other columns: {', '.join(facts.covariates)}")
+        return Answer(what, "yes", f"if the other columns show it: {', '.join(facts.covariates)}")
     return Answer(what, "no", "no other quantity was recorded; record it in a column of its own")
 
 
@@ -194,4 +194,6 @@ def _noise(facts: Facts, found: Excitation) -> Answer:
         return Answer(what, "yes", f"the input repeats every {found.period_s:.4g} s")
     if found.longest_hold_s >= 1.0:
         return Answer(what, "yes", "the input rests")
-    return Answer(what, "partly", "estimated from high frequencies, because the input neither repeats nor rests")
+    return Answer(
+        what, "partly", "estimated from high frequencies, because the input neither repeats nor rests"
+    )

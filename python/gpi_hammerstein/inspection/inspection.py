@@ -13,7 +13,7 @@ from gpi_hammerstein.inspection.clock import facts_of_clock
 from gpi_hammerstein.inspection.columns import facts_of_columns, resolution
 from gpi_hammerstein.inspection.command import command, experiment
 from gpi_hammerstein.inspection.excitation import excitation
-from gpi_hammerstein.inspection.findings import findings, shown
+from gpi_hammerstein.inspection.findings import findings, set_points, shown
 from gpi_hammerstein.inspection.identifiable import Facts, answers
 from gpi_hammerstein.inspection.remedy import Remedy, remedy
 from gpi_hammerstein.inspection.text import text_of
@@ -153,8 +153,6 @@ def inspect(
         notes = [] if recording is None else recording.notes
         return Inspection(files, notes=notes, **parts, next=_command("inspect", files, repeated, "mend"))
     parts |= _of_record(recording.record(), recording.notes)
-    if found is not None:
-        return Inspection(files, **parts, next=_command("inspect", files, repeated, "mend"))
     return Inspection(files, **parts, **_next(files, repeated, recording.notes))
 
 
@@ -213,9 +211,11 @@ def _of_record(record: Record, notes: list[str]) -> dict[str, Any]:
                 record.input_names, record.input_units, excitations, found["fed_back"], strict=True
             )
         ],
-        "outputs": [_output(record, index, found["clipped"][index]) for index in range(len(record.output_names))],
+        "outputs": [
+            _output(record, index, found["clipped"][index]) for index in range(len(record.output_names))
+        ],
         "notes": notes,
-        "findings": findings(record, found),
+        "findings": [*findings(record, found), *set_points(record)],
         "identifiable": [{"what": a.what, "possible": a.possible, "why": a.why} for a in answered],
         "next_experiment": experiment(answered, first, record.rate, record.input_units[0]),
     }
@@ -224,7 +224,8 @@ def _of_record(record: Record, notes: list[str]) -> dict[str, Any]:
 def _output(record: Record, index: int, clipped: float) -> dict[str, Any]:
     """Return the properties of one output."""
     y = np.concatenate([run[:, index] for run in record.y])
-    # white noise is multiplied by the root of 1 + 9 + 9 + 1 in third differences, and a smooth signal vanishes
+    # white noise is multiplied by the root of 1 + 9 + 9 + 1 in third differences, and a smooth signal
+    # vanishes
     third = np.concatenate([np.diff(run[:, index], 3) for run in record.y])
     noise = float(np.sqrt(np.mean(third**2) / 20.0)) if third.size else math.nan
     return {
@@ -236,5 +237,3 @@ def _output(record: Record, index: int, clipped: float) -> dict[str, Any]:
         "clipped": clipped,
         "noise_at_most": noise if math.isfinite(noise) else None,
     }
-
-

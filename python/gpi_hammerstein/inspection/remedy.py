@@ -9,6 +9,7 @@ import numpy as np
 from gpi_hammerstein._native import DataError, ParameterError
 from gpi_hammerstein.io.columns import Column
 from gpi_hammerstein.io.experiments import recording_of
+from gpi_hammerstein.io.nameless import is_clock
 from gpi_hammerstein.io.recording import Recording
 from gpi_hammerstein.io.sources import Source
 from gpi_hammerstein.io.tables import Table
@@ -81,9 +82,13 @@ def _columns_to_name(table: Table, options: dict[str, Any]) -> dict[str, Any]:
     if options.get("input") is None:
         moving = [column for column in table.columns if _moves(table, column)]
         clocks = [column for column in moving if score(column, "time")[0]]
+        if not clocks and options.get("time") is None and options.get("rate") is None:
+            clocks = [column for column in moving if is_clock(table.columns[column])][:1]
+            named |= {"time": column.header for column in clocks}
         signals = [column for column in moving if column not in clocks]
-        # what speaks for an output is not proposed as the input if there is another one
-        signals.sort(key=lambda column: score(column, "output")[0] > score(column, "input")[0])
+        # a word such as "velocity" speaks against both roles, and a measured motion can be imposed
+        known = [c for c in signals if score(c, "input")[0] or score(c, "output")[0]]
+        signals = known if len(known) > 1 else signals
         for role, column in zip(("input", "output"), signals, strict=False):
             named[role] = column.header
         if not clocks and options.get("rate") is None and table.rate is None:

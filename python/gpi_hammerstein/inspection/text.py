@@ -76,7 +76,9 @@ def _columns(columns: Sequence[Mapping[str, Any]]) -> list[str]:
     if not cells:
         return []
     widths = [max(len(cell[place]) for cell in cells) for place in range(4)]
-    return ["  ".join(f"{a:<{w}}" for a, w in zip(cell, [*widths, 0], strict=True)).rstrip() for cell in cells]
+    return [
+        "  ".join(f"{a:<{w}}" for a, w in zip(cell, [*widths, 0], strict=True)).rstrip() for cell in cells
+    ]
 
 
 def _record(record: Mapping[str, Any], found: Mapping[str, Any]) -> list[str]:
@@ -87,12 +89,14 @@ def _record(record: Mapping[str, Any], found: Mapping[str, Any]) -> list[str]:
     clock = found.get("clock")
     if clock and "median_step_s" in clock:
         spread = max(
-            clock["largest_step_s"] - clock["median_step_s"], clock["median_step_s"] - clock["smallest_step_s"]
+            clock["largest_step_s"] - clock["median_step_s"],
+            clock["median_step_s"] - clock["smallest_step_s"],
         )
         jitter = spread / clock["median_step_s"]
         if clock["gaps"] or clock["backward"] or clock["repeated"]:
             lines.append(
-                f"clock: {clock['gaps']} gaps, {clock['backward']} jumps back, {clock['repeated']} repeated stamps"
+                f"clock: {_count(clock['gaps'], 'gap')}, {_count(clock['backward'], 'jump')} back, "
+                f"{_count(clock['repeated'], 'repeated stamp')}"
             )
         elif jitter > 0.01:
             lines.append(f"clock: steps differ from the median step by up to {100 * jitter:.2g} %")
@@ -107,7 +111,8 @@ def _signals(found: Mapping[str, Any]) -> list[str]:
         low, high = one["band_hz"]
         text = (
             f"input {one['name']}: {one['low']:.4g} to {one['high']:.4g} {one['unit']}".rstrip()
-            + f", {low:.3g} to {high:.3g} Hz, {one['swings']} swings of {one['lengths']} lengths"
+            + f", {low:.3g} to {high:.3g} Hz, {_count(one['swings'], 'large swing')}, "
+            f"{_count(one['lengths'], 'length')} of swings"
         )
         if one["longest_hold_s"] * found["record"]["rate_hz"] > 10:
             text += f", rests for up to {one['longest_hold_s']:.3g} s"
@@ -125,3 +130,7 @@ def _signals(found: Mapping[str, Any]) -> list[str]:
             text += f", white noise of at most {one['noise_at_most']:.2g}{unit} rms"
         lines.append(text)
     return lines
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("" if number == 1 else "s")

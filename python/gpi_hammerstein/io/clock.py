@@ -14,7 +14,8 @@ GAP_STEPS = 10.0
 # A finer grid is most likely a wrong unit, and would need too much memory.
 MOST_REFINED = 100.0
 
-# A larger part of rows with the stamp of the row above comes from rounded stamps, not from single repeated rows.
+# A larger part of rows with the stamp of the row above comes from rounded stamps, not from single repeated
+# rows.
 ROUNDED = 0.05
 # A larger part of rows that go back in time is no clock that was set back.
 BACKWARD = 0.1

@@ -151,7 +151,15 @@ def _read_part(
     ]
     notes += swapped_note(runs, roles)
     return Recording(
-        runs, given, roles.inputs, roles.outputs, roles.covariates, notes, roles.undecided, roles.why, roles.time
+        runs,
+        given,
+        roles.inputs,
+        roles.outputs,
+        roles.covariates,
+        notes,
+        roles.undecided,
+        roles.why,
+        roles.time,
     )
 
 

@@ -68,10 +68,10 @@ def read_plain_hdf5(file: File) -> list[Table]:
     Parameters
     ----------
     file
-        The file, with datasets of the shapes of :func:`~gpi_hammerstein.io.arrays.from_arrays` in any groups. A
-        dataset is called by its own name, or by its path if several have this name. A table (a dataset with
-        fields) gives one column for each field. The attributes ``units`` or ``unit`` of a dataset, and ``rate``,
-        ``fs`` or ``dt`` of a dataset or group, are used.
+        The file, with datasets of the shapes of :func:`~gpi_hammerstein.io.arrays.from_arrays` in any groups.
+        A dataset is called by its own name, or by its path if several have this name. A table (a dataset with
+        fields) gives one column for each field. The attributes ``units`` or ``unit`` of a dataset, and
+        ``rate``, ``fs`` or ``dt`` of a dataset or group, are used.
 
     Returns
     -------

@@ -90,8 +90,8 @@ def find_header(text: str) -> Header | None:
     if numbers is None:
         # without a row of numbers, take the first line as names: the error is then found in the rows below
         separator = max(SEPARATORS, key=lines[0].count)
-        below = "\n".join([*lines[1:], rest]).strip("\r\n")
-        return Header(_cells(lines[0], separator), separator, below, [])
+        rows = "\n".join([*lines[1:], rest]).strip("\r\n")
+        return Header(_cells(lines[0], separator), separator, rows, [])
     starts = _starts(lines, *numbers, remarks)
     ends = [*(start.top() for start in starts[1:]), len(lines)]
     sizes = [end - start.first for start, end in zip(starts, ends, strict=True)]
@@ -154,7 +154,8 @@ def _start(lines: Sequence[str], first: int, separator: str, remarks: dict[int, 
 
     if first in remarks and (found := named(remarks[first].lstrip("#% \t"))):
         return _Start(None, first, found, separator)
-    # Rows with some text can stand between the names and the first row of numbers alone; names contain no number.
+    # Rows with some text can stand between the names and the first row of numbers alone; names contain no
+    # number.
     names = first - 1
     while (
         names > 0 and len(cells := _cells(lines[names], separator)) == len(row) and any(map(is_number, cells))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gpi_hammerstein.io.columns import Column
 from gpi_hammerstein.io.tables import Table
@@ -16,8 +17,8 @@ def name_by_content(table: Table) -> Table:
     """Name the columns of a file without names where their number leaves no choice.
 
     A first column that increases in equal steps is the time. If two other columns move, the first one is the
-    input and the second one is the output, which is the usual order. In any other case, the columns keep their
-    numbers and a user has to name them.
+    input and the second one is the output, which is the usual order. In any other case, the columns keep
+    their numbers and a user has to name them.
 
     Parameters
     ----------
@@ -27,7 +28,8 @@ def name_by_content(table: Table) -> Table:
     Returns
     -------
     Table
-        The columns with the names ``t``, ``u``, ``y``; their headers are still the numbers. A note says which.
+        The columns with the names ``t``, ``u``, ``y``; their headers are still the numbers. A note says
+        which.
 
     Examples
     --------
@@ -37,7 +39,7 @@ def name_by_content(table: Table) -> Table:
     ['t', 'u', 'y']
     """
     columns = list(table.columns)
-    clock = columns[:1] if columns and _is_clock(table.columns[columns[0]]) else []
+    clock = columns[:1] if columns and is_clock(table.columns[columns[0]]) else []
     moving = [c for c in columns if c not in clock and np.ptp(table.columns[c]) > 0]
     note = "the file has no line of names: the columns are numbered"
     if len(moving) != 2:
@@ -54,8 +56,19 @@ def name_by_content(table: Table) -> Table:
     )
 
 
-def _is_clock(samples: np.ndarray) -> bool:
-    """Return whether samples increase in equal steps."""
+def is_clock(samples: NDArray[np.float64]) -> bool:
+    """Return whether samples increase in equal steps.
+
+    Parameters
+    ----------
+    samples
+        The samples, (samples,).
+
+    Examples
+    --------
+    >>> is_clock(np.array([0.0, 0.1, 0.2])), is_clock(np.array([0.0, 1.0, 0.0]))
+    (True, False)
+    """
     steps = np.diff(samples)
     usual = float(np.median(steps)) if steps.size else 0.0
     return bool(usual > 0 and np.abs(steps - usual).max() <= JITTER * usual)

@@ -30,21 +30,21 @@ def read_record(
         CSV (``.csv``, ``.csv.gz``, also separated by semicolons, tabs or spaces), Excel (``.xlsx``), Parquet
         (``.parquet``), NumPy (``.npz``, ``.npy``), MATLAB v4, v5 or v7.3 (``.mat``), HDF5 (``.h5``), LabVIEW
         (``.lvm``, ``.tdms``) and MDF (``.mf4``). Excel, TDMS and MDF need the extras ``xlsx``, ``tdms`` and
-        ``mdf``. Arrays in NumPy, MATLAB and HDF5 files have the shape (samples,), (samples, channels), (samples, channels, realisations) or (samples, channels,
-        realisations, periods). Every realisation is an experiment; all of its periods except the last one are
-        warm-up. A Polars or pandas data frame or an xarray dataset, with columns named as in a CSV file, is
-        also accepted.
+        ``mdf``. Arrays in NumPy, MATLAB and HDF5 files have the shape (samples,), (samples, channels),
+        (samples, channels, realisations) or (samples, channels, realisations, periods). Every realisation is
+        an experiment; all of its periods except the last one are warm-up. A Polars or pandas data frame or an
+        xarray dataset, with columns named as in a CSV file, is also accepted.
     input, output, covariate
         Names of the columns with or without their unit: ``"u_V"`` or ``"u"``. If they are not given, columns
         are recognised by words in their names and by their units, and a note says why. Inputs: ``u``, ``u1``,
-        ``input``, else words such as ``voltage``, ``drive``, ``command``. Outputs: ``y``, ``y1``, ``output``, else
-        words such as ``position``, ``sensor``. Every other
-        column with only numbers is a covariate (``covariate=[]`` ignores them). A ``.npy`` file contains only the input;
-        `output` is then the path of the file with the output. For several ``.npy`` files, give one output
-        file for each of them.
+        ``input``, else words such as ``voltage``, ``drive``, ``command``. Outputs: ``y``, ``y1``, ``output``,
+        else words such as ``position``, ``sensor``. Every other column with only numbers is a covariate
+        (``covariate=[]`` ignores them). A ``.npy`` file contains only the input; `output` is then the path of
+        the file with the output. For several ``.npy`` files, give one output file for each of them.
     time
-        Name of the time column; ``t``, ``time`` and similar names are recognised. The unit is part of the name
-        (``t_ms``, ``Time (ms)``); without a unit, it is s. Dates and times of day are converted to seconds.
+        Name of the time column; ``t``, ``time`` and similar names are recognised. The unit is part of the
+        name (``t_ms``, ``Time (ms)``); without a unit, it is s. Dates and times of day are converted to
+        seconds.
     rate
         Sampling rate in Hz; it replaces the time column.
     warmup
@@ -76,11 +76,11 @@ def read_record(
     -----
     Four limits protect against files that exhaust memory or time. They are environment variables:
     ``GPI_MAX_READ_BYTES`` (1073741824), the size of the data of one file after decompression;
-    ``GPI_MAX_READ_RATIO`` (100), the ratio of this size to the size of the file, if the data has more than
-    16 MiB; ``GPI_MAX_READ_COLUMNS`` (1000), the number of columns or variables of one file;
-    ``GPI_MAX_READ_SECONDS`` (120), the time for a Parquet, HDF5, Excel, TDMS or MDF file. These formats are read
-    in another process, because their libraries can end a process or block it if a file is corrupt. An HDF5 file that refers to other
-    files is refused.
+    ``GPI_MAX_READ_RATIO`` (100), the ratio of this size to the size of the file, if the data has more than 16
+    MiB; ``GPI_MAX_READ_COLUMNS`` (1000), the number of columns or variables of one file;
+    ``GPI_MAX_READ_SECONDS`` (120), the time for a Parquet, HDF5, Excel, TDMS or MDF file. These formats are
+    read in another process, because their libraries can end a process or block it if a file is corrupt. An
+    HDF5 file that refers to other files is refused.
 
     Examples
     --------

@@ -60,9 +60,9 @@ class Guess:
 def guess(columns: Sequence[Column], role: str) -> Guess:
     """Find the columns of a role by their names and units.
 
-    The columns with the largest score of :mod:`~gpi_hammerstein.io.vocabulary` are taken if their names are the
-    usual ones or differ only in a number. If equal scores belong to different names, none is taken. A column
-    for which only its unit speaks must be the only one.
+    The columns with the largest score of :mod:`~gpi_hammerstein.io.vocabulary` are taken if their names are
+    the usual ones or differ only in a number. If equal scores belong to different names, none is taken. A
+    column for which only its unit speaks must be the only one.
 
     Parameters
     ----------

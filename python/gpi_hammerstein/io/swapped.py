@@ -1,14 +1,14 @@
 """Whether the input and the output of a record look as if they were swapped.
 
-An actuator follows its input: by hysteresis, creep and dynamics, its output lags. With y the output without its
-mean, du the central difference of the input and du, dy without trend, the correlation
+An actuator follows its input: by hysteresis, creep and dynamics, its output lags. With y the output without
+its mean, du the central difference of the input and du, dy without trend, the correlation
 
     c = sum(y du) / sqrt(sum(y^2) sum(du^2)) * sign(sum(y u))
 
-is negative for an output that lags and positive for one that leads: for u = cos(wt) and y = cos(wt - phi), it is
--sin(phi). A damper (displacement to force) and a differentiating sensor lead too. The record is therefore called
-suspicious only if a second sign agrees: the "input" has sensor noise and the "output" has none, or the units are
-those of a sensor and of a drive.
+is negative for an output that lags and positive for one that leads: for u = cos(wt) and y = cos(wt - phi), it
+is -sin(phi). A damper (displacement to force) and a differentiating sensor lead too. The record is therefore
+called suspicious only if a second sign agrees: the "input" has sensor noise and the "output" has none, or the
+units are those of a sensor and of a drive.
 """
 
 from collections.abc import Sequence
@@ -27,10 +27,11 @@ Array = NDArray[np.float64]
 LEADS = 0.01
 # Blocks of time, of which this part must agree. By hand.
 BLOCKS, AGREE = 10, 0.8
-# A signal is rougher than another one if the part of its power in third differences is this many times larger.
+# A signal is rougher than another one if the part of its power in third differences is this many times
+# larger.
 ROUGHER = 10.0
-# The roughness in fourth differences over that in third ones: 1 for white noise, the square of the phase step for a
-# smooth signal.
+# The roughness in fourth differences over that in third ones: 1 for white noise, the square of the phase step
+# for a smooth signal.
 NOISY, SMOOTH = 0.3, 0.1
 
 
@@ -72,10 +73,11 @@ def lead(u: Array, y: Array) -> tuple[float, float]:
 
 
 def centred(x: Array) -> Array:
-    """Return a signal without its mean, with a largest magnitude of at most two so that no power overflows."""
+    """Return a signal without its mean, scaled so that no power overflows."""
     largest = float(np.abs(x).max())
-    x = x / largest if largest > 0 else x
-    return x - x.mean()
+    scaled: Array = x / largest if largest > 0 else x
+    result: Array = scaled - scaled.mean()
+    return result
 
 
 def roughness(x: Array, order: int = 3) -> float:

@@ -62,7 +62,7 @@ def read_csv(file: File) -> list[Table]:
 
 
 def table_of_text(text: str, file: File) -> Table:
-    """Convert the text of a table.
+    r"""Convert the text of a table.
 
     Parameters
     ----------

@@ -13,11 +13,11 @@ weight      words for the input                                             word
 2           what is wanted: reference, setpoint, desired
 ==========  ==============================================================  ==================================
 
-A word of the table is found in a name if it equals one of the name's words, if it has four letters or more and
-one of them begins with it, or if it has six letters or more and one of them contains it (German joins words:
-"Stellspannung"). Words are compared without case and accents. Units of voltage, current and pressure fit the
-input, units of length and angle the output. A column whose name contains a word for something else (velocity,
-temperature, trigger) has the score zero.
+A word of the table is found in a name if it equals one of the name's words, if it has four letters or more
+and one of them begins with it, or if it has six letters or more and one of them contains it (German joins
+words: "Stellspannung"). Words are compared without case and accents. Units of voltage, current and pressure
+fit the input, units of length and angle the output. A column whose name contains a word for something else
+(velocity, temperature, trigger) has the score zero.
 """
 
 import re
