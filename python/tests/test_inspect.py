@@ -136,7 +136,7 @@ def test_the_command_prints_columns_and_what_to_run_next(
     ("names", "changed", "words"),
     [
         (["t_s", "u_V", "y_um"], "gap", ["--resample", "auto"]),
-        (["Kanal", "alpha", "beta"], "", ["--time", "Kanal", "--input", "alpha", "--output", "beta"]),
+        (["Kanal", "alpha", "beta"], "", ["--input", "alpha", "--output", "beta", "--time", "Kanal"]),
         (["n_s", "CH1", "CH2"], "", ["--input", "CH1", "--output", "CH2"]),
         (["number", "u_V", "y_um"], "", ["--rate", "HZ"]),
         (["t_s", "u_V", "foo"], "", ["--output", "COLUMN"]),

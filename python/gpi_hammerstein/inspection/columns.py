@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpi_hammerstein.io.columns import Column
 from gpi_hammerstein.io.recording import Recording
 from gpi_hammerstein.io.tables import Table
 

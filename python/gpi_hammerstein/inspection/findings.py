@@ -84,8 +84,8 @@ def findings(record: Record, found: dict[str, Any]) -> list[str]:
             sentences.append(f"The input {name} is constant, so that nothing can be identified from it.")
         if found["fed_back"][index]:
             sentences.append(
-                f"The input {name} depends on past outputs, as under feedback: a model of it is biased. Record in "
-                "open loop, or take the reference of the controller as the input."
+                f"The input {name} depends on past outputs, as under feedback: a model of it is biased. "
+                "Record in open loop, or take the reference of the controller as the input."
             )
     for index, name in enumerate(record.output_names):
         y = np.concatenate([run[:, index] for run in record.y])
@@ -120,8 +120,8 @@ def set_points(record: Record) -> list[str]:
     """
     named = [name for name in record.covariate_names if score(parse_header(name), "input")[0]]
     return [
-        f"The column {name} looks like a command or a set point. If a controller computes {record.input_names[0]} from it, "
-        "the input is fed back, and a model of it is biased. If it is no measured influence, ignore it with "
+        f"The column {name} looks like a command or a set point. If a controller computes "
+        f"{record.input_names[0]} from it, the input is fed back, and a model of it is biased. If it is no measured influence, ignore it with "
         "--covariate none."
         for name in named
     ]
@@ -134,8 +134,8 @@ def _of_output(name: str, unit: str, y: Array, clipped: float) -> Sequence[str]:
         return [f"The output {name} is constant, so that nothing can be identified from it."]
     if clipped > CLIPPED:
         sentences.append(
-            f"The output {name} stands at its largest or smallest value for {100 * clipped:.2g} % of the samples "
-            "while the input moves: the sensor saturates there. Reduce the amplitude or the gain of the sensor."
+            f"The output {name} stands at its largest or smallest value for {100 * clipped:.2g} % of "
+            "the samples while the input moves: the sensor saturates there. Reduce the amplitude or the gain of the sensor."
         )
     step = resolution(y)
     if step is not None and span / step < FEW_LEVELS:

@@ -109,7 +109,7 @@ def _hysteresis(facts: Facts, found: Excitation) -> Answer:
     unit = f" {facts.input_unit}" if facts.input_unit else ""
     limit = f"half-widths up to {0.5 * found.largest_swing:.4g}{unit}, half the largest swing"
     if found.swings < SWINGS:
-        return Answer("hysteresis", "no", f"the input turns too rarely for a loop", "triangle")
+        return Answer("hysteresis", "no", "the input turns too rarely for a loop", "triangle")
     if found.lengths < NESTED:
         loops = "one loop, because all swings have one length" if found.lengths == 1 else "two loops"
         return Answer("hysteresis", "partly", f"{limit}, but only along {loops}", "triangle")
@@ -159,7 +159,8 @@ def _rate_dependence(found: Excitation) -> Answer:
     return Answer(
         what,
         "no",
-        f"all long swings have about the same speed (factor {found.speeds:.2f}); repeat one triangle at three speeds",
+        f"all long swings have about the same speed (factor {found.speeds:.2f}); repeat one triangle at "
+        "three speeds",
         "triangle",
     )
 

@@ -28,7 +28,7 @@ SCHEMA = "gpi-inspection/1"
 
 @dataclass(frozen=True)
 class Inspection:
-    """What a record contains, and what a model of it can and cannot determine. Printing it shows a summary."""
+    """What a record contains, and what a model of it can determine. Printing it shows a summary."""
 
     files: list[str]
     problem: str | None = None

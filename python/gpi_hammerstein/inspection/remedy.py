@@ -84,7 +84,7 @@ def _columns_to_name(table: Table, options: dict[str, Any]) -> dict[str, Any]:
         clocks = [column for column in moving if score(column, "time")[0]]
         if not clocks and options.get("time") is None and options.get("rate") is None:
             clocks = [column for column in moving if is_clock(table.columns[column])][:1]
-            named |= {"time": column.header for column in clocks}
+            named["time"] = clocks[0].header if clocks else None
         signals = [column for column in moving if column not in clocks]
         # a word such as "velocity" speaks against both roles, and a measured motion can be imposed
         known = [c for c in signals if score(c, "input")[0] or score(c, "output")[0]]

@@ -21,7 +21,8 @@ def text_of(found: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> print(text_of({"files": ["run.csv"], "columns": [], "next": {"why": "", "command": "gpi report run.csv"}}))
+    >>> found = {"files": ["run.csv"], "columns": [], "next": {"why": "", "command": "gpi report run.csv"}}
+    >>> print(text_of(found))
     run.csv
     <BLANKLINE>
     Next

@@ -81,8 +81,8 @@ def _advice(stamps: Array) -> str:
     if repeated > ROUNDED and not (steps < 0).any():
         mean = steps.size / (stamps[-1] - stamps[0])
         return (
-            f"; {100 * repeated:.3g} % of the rows have the stamp of the row above, because the stamps are rounded: "
-            f"give the rate with --rate, on average it is {mean:.6g} Hz"
+            f"; {100 * repeated:.3g} % of the rows have the stamp of the row above, because the stamps are "
+            f"rounded: give the rate with --rate, on average it is {mean:.6g} Hz"
         )
     return (
         "; use --resample auto (resample=True): it cuts the record where the clock pauses or jumps back, and "

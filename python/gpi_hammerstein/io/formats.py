@@ -55,8 +55,8 @@ DISGUISED = {
 }
 OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 NAMES = (
-    "names of record files end in .csv, .csv.gz, .txt, .xlsx, .parquet, .npz, .npy, .mat, .h5, .lvm, .tdms or "
-    ".mf4"
+    "names of record files end in .csv, .csv.gz, .txt, .xlsx, .parquet, .npz, .npy, .mat, .h5, .lvm, "
+    ".tdms or .mf4"
 )
 
 
@@ -108,7 +108,8 @@ def _require_format(file: File, chosen: Format) -> None:
     for start, suffix in DISGUISED.items():
         if file.data.startswith(start):
             raise DataError(
-                f"{file.path}: is no text file, but looks like {suffix}; rename it so that it ends in {suffix}"
+                f"{file.path}: is no text file, but looks like {suffix}; rename it so that it ends in "
+                f"{suffix}"
             )
 
 

@@ -66,7 +66,8 @@ def read_mdf(file: File) -> list[Table]:
     others = [str(place) for _, count, place in groups if place != chosen and count]
     if others:
         tables[0].notes.append(
-            f"channel group {chosen} is read; other groups with other clocks are left out: {', '.join(others)}"
+            f"channel group {chosen} is read; other groups with other clocks are left out: "
+            f"{', '.join(others)}"
         )
     return tables
 

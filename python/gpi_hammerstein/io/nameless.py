@@ -34,7 +34,8 @@ def name_by_content(table: Table) -> Table:
     Examples
     --------
     >>> from gpi_hammerstein.io.columns import parse_header
-    >>> columns = {parse_header(f"column{k + 1}"): np.array(v) for k, v in enumerate([[0.0, 1], [2.0, 3], [4.0, 5]])}
+    >>> names = [parse_header(f"column{place}") for place in (1, 2, 3)]
+    >>> columns = dict(zip(names, np.array([[0.0, 1.0], [2.0, 3.0], [4.0, 5.0]]), strict=True))
     >>> [column.name for column in name_by_content(Table("demo", columns, {})).headers()]
     ['t', 'u', 'y']
     """

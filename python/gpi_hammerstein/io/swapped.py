@@ -180,5 +180,6 @@ def swapped_note(runs: Sequence[Run], roles: Roles) -> list[str]:
     if len(found) < 2:
         return []
     return [
-        f"input and output look swapped: {'; '.join(found)}; if so, use --input {y.header} --output {u.header}"
+        f"input and output look swapped: {'; '.join(found)}; if so, use --input {y.header} "
+        f"--output {u.header}"
     ]

@@ -82,8 +82,8 @@ class Table:
                 advice = "correct these rows"
                 if has_clock:
                     advice += (
-                        ", or leave them out with --resample auto (resample=True): it interpolates over a few "
-                        "rows, and cuts the record where more are missing"
+                        ", or leave them out with --resample auto (resample=True): it interpolates over a "
+                        "few rows, and cuts the record where more are missing"
                     )
                 raise DataError(
                     f"{self.source}: column `{column.header}` has {rows.size} NaN, infinite or empty "

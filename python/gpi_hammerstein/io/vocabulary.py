@@ -39,18 +39,21 @@ _WORDS: dict[str, list[tuple[int, str]]] = {
     "input": [
         (
             4,
-            "u in input eingang command cmd drive driver stell ansteuer generator waveform excitation anregung ao dac",
+            "u in input eingang command cmd drive driver stell ansteuer generator waveform excitation "
+            "anregung ao dac",
         ),
         (
             3,
-            "voltage volt spannung tension current strom pressure druck motor actuator aktor aktuator amplifier",
+            "voltage volt spannung tension current strom pressure druck motor actuator aktor aktuator "
+            "amplifier",
         ),
         (2, "reference ref setpoint desired target demand soll wanted"),
     ],
     "output": [
         (
             4,
-            "y out output ausgang sensor cap capacitive kapazitiv lvdt encoder interferometer laser probe gauge",
+            "y out output ausgang sensor cap capacitive kapazitiv lvdt encoder interferometer laser "
+            "probe gauge",
         ),
         (4, "measured measurement mess gemessen ist response antwort ai adc readback"),
         (3, "position pos displacement disp deflection weg auslenkung hub stroke travel strain dehnung"),
