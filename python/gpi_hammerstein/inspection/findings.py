@@ -121,8 +121,8 @@ def set_points(record: Record) -> list[str]:
     named = [name for name in record.covariate_names if score(parse_header(name), "input")[0]]
     return [
         f"The column {name} looks like a command or a set point. If a controller computes "
-        f"{record.input_names[0]} from it, the input is fed back, and a model of it is biased. If it is no measured influence, ignore it with "
-        "--covariate none."
+        f"{record.input_names[0]} from it, the input is fed back, and a model of it is biased. If it is "
+        "no measured influence, ignore it with --covariate none."
         for name in named
     ]
 
@@ -135,7 +135,8 @@ def _of_output(name: str, unit: str, y: Array, clipped: float) -> Sequence[str]:
     if clipped > CLIPPED:
         sentences.append(
             f"The output {name} stands at its largest or smallest value for {100 * clipped:.2g} % of "
-            "the samples while the input moves: the sensor saturates there. Reduce the amplitude or the gain of the sensor."
+            "the samples while the input moves: the sensor saturates there. Reduce the amplitude "
+            "or the gain of the sensor."
         )
     step = resolution(y)
     if step is not None and span / step < FEW_LEVELS:

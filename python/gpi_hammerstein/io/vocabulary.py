@@ -96,7 +96,7 @@ def score(column: Column, role: str) -> tuple[int, str]:
     --------
     >>> from gpi_hammerstein.io.columns import parse_header
     >>> score(parse_header("Capacitive sensor [nm]"), "output")
-    (5, 'its name contains `sensor` and its unit is nm')
+    (5, 'its name contains `capacitive` and its unit is nm')
     """
     if EXACT[role].fullmatch(column.name):
         return EXACTLY, f"it is named `{column.name}`"
