@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,64 +16,12 @@ from gpi_hammerstein.inspection.excitation import excitation
 from gpi_hammerstein.inspection.findings import findings, set_points, shown
 from gpi_hammerstein.inspection.identifiable import Facts, answers
 from gpi_hammerstein.inspection.remedy import Remedy, remedy
-from gpi_hammerstein.inspection.text import text_of
+from gpi_hammerstein.inspection.result import Inspection
 from gpi_hammerstein.io.columns import TIME_UNITS
 from gpi_hammerstein.io.experiments import recording_of
 from gpi_hammerstein.io.frames import Frame
 from gpi_hammerstein.io.recording import Recording
 from gpi_hammerstein.io.sources import Names, PathLike, Source, read_sources
-
-SCHEMA = "gpi-inspection/1"
-
-
-@dataclass(frozen=True)
-class Inspection:
-    """What a record contains, and what a model of it can determine. Printing it shows a summary."""
-
-    files: list[str]
-    problem: str | None = None
-    """Why the record cannot be used as it is; None if it can."""
-    assumed: str | None = None
-    """The option with which the rest of the inspection was made, if there is a problem."""
-    columns: list[dict[str, Any]] = field(default_factory=list)
-    """Properties of every column of the (first) file."""
-    clock: dict[str, Any] | None = None
-    """Properties of the time stamps; None without a time column."""
-    record: dict[str, Any] | None = None
-    """Samples, rate, duration, experiments; None if the record cannot be read."""
-    inputs: list[dict[str, Any]] = field(default_factory=list)
-    """The excitation by each input."""
-    outputs: list[dict[str, Any]] = field(default_factory=list)
-    """Range, resolution and saturation of each output."""
-    notes: list[str] = field(default_factory=list)
-    """What was changed or guessed while the record was read."""
-    findings: list[str] = field(default_factory=list)
-    """What is wrong or remarkable."""
-    identifiable: list[dict[str, str]] = field(default_factory=list)
-    """What can be determined: ``what``, ``possible`` (yes, partly, no), ``why``."""
-    next: dict[str, str] = field(default_factory=dict)
-    """``command`` and ``why``: what to run next."""
-    next_experiment: dict[str, str] | None = None
-    """``command`` and ``why``: the drive for another experiment; None if nothing is missing."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the inspection as plain values, with the key ``schema``.
-
-        Returns
-        -------
-        dict
-            All fields.
-
-        Examples
-        --------
-        >>> Inspection(["run.csv"]).to_dict()["schema"]
-        'gpi-inspection/1'
-        """
-        return {"schema": SCHEMA, **asdict(self)}
-
-    def __str__(self) -> str:
-        """Return a summary in words."""
-        return text_of(self.to_dict())
 
 
 def inspect(
@@ -93,14 +41,14 @@ def inspect(
     source
         A record, or what :func:`read_record` reads: a file, several files, a data frame.
     input, output, time, rate, covariate, resample
-        As in :func:`read_record`; without effect for a record.
+        As in :func:`read_record` (rates in Hz); without effect for a record.
 
     Returns
     -------
     Inspection
-        Columns and their roles, clock, excitation, saturation, quantisation, what can be identified, and the
-        command to run next. If columns or the clock cannot be used as they are, ``problem`` says why, and
-        ``next`` how to go on.
+        Columns with their units and roles, clock, excitation, saturation, quantisation, what can be
+        identified, and the command to run next. If columns or the clock cannot be used as they are,
+        ``problem`` says why, and ``next`` how to go on.
 
     Raises
     ------
@@ -118,7 +66,7 @@ def inspect(
     ('hysteresis', 'yes')
     """
     if isinstance(source, Record):
-        return Inspection(["the record"], **_of_record(source, []), **_next([], {}, []))
+        return Inspection({"files": ["the record"], **_of_record(source, []), **_next([], {}, [])})
     sources = read_sources(source, output)
     files = [one.name for one in sources]
     options: dict[str, Any] = {
@@ -151,9 +99,11 @@ def inspect(
             parts["problem"] = problem
             repeated["output"] = repeated["output"] or "COLUMN"
         notes = [] if recording is None else recording.notes
-        return Inspection(files, notes=notes, **parts, next=_command("inspect", files, repeated, "mend"))
+        return Inspection(
+            {"files": files, "notes": notes, **parts, "next": _command("inspect", files, repeated, "mend")}
+        )
     parts |= _of_record(recording.record(), recording.notes)
-    return Inspection(files, **parts, **_next(files, repeated, recording.notes))
+    return Inspection({"files": files, **parts, **_next(files, repeated, recording.notes)})
 
 
 def _clock(source: Source, recording: Recording | None) -> dict[str, Any] | None:

@@ -11,6 +11,8 @@ UNITS = frozenset(
     + "Pa kPa MPa bar mbar psi g kg deg rad mrad urad nrad arcsec K degC degF Hz kHz MHz T mT Oe".split()
     + "Ohm kOhm F nF pF percent rpm kip kips lbf klbf kgf mil mils inch ft".split()
 )
+# A longer header is no name with a unit, and would take long to search.
+LONGEST = 500
 # Signs that stand for a letter of a unit.
 SIGNS = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u03a9": "Ohm"})
 
@@ -58,6 +60,8 @@ def parse_header(header: str, array: str | None = None) -> Column:
     """
     header = header.strip()
     name, unit = header, ""
+    if len(header) > LONGEST:
+        return Column(header, name, unit, array or header)
     if found := re.fullmatch(r"(.*?)[\s_]*[\[(](.*)[\])]", header):
         name, unit = found[1] or header, found[2].strip()
     else:

@@ -86,7 +86,7 @@ def table_of_text(text: str, file: File) -> Table:
     >>> from pathlib import Path
     >>> from gpi_hammerstein.io.limits import Allowance
     >>> file = File(Path("demo"), b"", Allowance(Path("demo"), 0))
-    >>> [column.name for column in table_of_text("t,u\\n0,1\\n", file).headers()]
+    >>> [column.name for column in table_of_text("t,u\n0,1\n", file).headers()]
     ['t', 'u']
     """
     path = file.path

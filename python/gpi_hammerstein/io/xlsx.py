@@ -81,7 +81,10 @@ def _lines(rows: Iterable[Iterable[Any]], file: File) -> tuple[list[str], int]:
         file.allowance.spend(CELL_BYTES * (len(cells) + 1))
         if cells:
             numbers += sum(isinstance(cell, int | float) for cell in cells) > 1
-            table.append(list(_texts(cells)))
+            texts = list(_texts(cells))
+            # A workbook stores a text once, and any number of cells can refer to it.
+            file.allowance.spend(sum(map(len, texts)))
+            table.append(texts)
             width = max(width, len(cells))
     file.allowance.spend(width * len(table))
     return ["\t".join(row + [""] * (width - len(row))) for row in table], numbers
