@@ -132,7 +132,7 @@ class Inspection:
 
     @property
     def next_experiment(self) -> dict[str, str] | None:
-        """The ``command`` that writes the drive of another experiment, and ``why``; None if none is needed."""
+        """The ``command`` that writes the drive of another experiment, and ``why``; None if not needed."""
         found: dict[str, str] | None = self._found["next_experiment"]
         return found
 
@@ -142,7 +142,7 @@ class Inspection:
         Returns
         -------
         dict
-            All properties, with their units.
+            All properties: signals in their own units, times in s, rates in Hz.
 
         Examples
         --------
@@ -156,4 +156,5 @@ class Inspection:
         return text_of(self._found)
 
     def __repr__(self) -> str:
+        """Return the names of the files."""
         return f"Inspection({', '.join(self.files)})"
