@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import signal
 
 from gpi_hammerstein._native import DataError, Record, signs
 from gpi_hammerstein.inspection.columns import resolution
@@ -19,8 +20,9 @@ FEW_LEVELS = 1000
 CLIPPED = 0.005
 # Samples that a model of hysteresis and dynamics needs at least. By hand.
 FEW_SAMPLES = 500
-# Squared correlation below which an output seems not to belong to the input.
-UNRELATED = 0.01
+# Squared coherence below which an output seems not to belong to the input: unrelated signals have about 0.03
+# in the average over this number of segments, which must have some samples.
+UNRELATED, SEGMENTS, SHORTEST = 0.05, 32, 16
 
 
 def shown(record: Record) -> dict[str, Any]:
@@ -92,10 +94,10 @@ def findings(record: Record, found: dict[str, Any]) -> list[str]:
         sentences += _of_output(name, record.output_units[index], y, found["clipped"][index])
         if len(record.input_names) == 1 and np.ptp(y) > 0:
             u = np.concatenate([run[:, 0] for run in record.u])
-            if np.ptp(u) > 0 and _similar(u, y) < UNRELATED:
+            if np.ptp(u) > 0 and (explained := coherence(u, y)) < UNRELATED:
                 sentences.append(
-                    f"The output {name} hardly follows the input: a straight line explains "
-                    f"{100 * _similar(u, y):.2g} % of its variance. Check that the columns belong together."
+                    f"The output {name} hardly follows the input: no linear system explains more than about "
+                    f"{100 * explained:.2g} % of its variance. Check that the columns belong together."
                 )
     return sentences
 
@@ -149,7 +151,34 @@ def _of_output(name: str, unit: str, y: Array, clipped: float) -> Sequence[str]:
     return sentences
 
 
-def _similar(u: Array, y: Array) -> float:
-    """Return the squared correlation of two signals."""
-    a, b = (u - u.mean()) / np.ptp(u), (y - y.mean()) / np.ptp(y)
-    return float((a @ b) ** 2 / ((a @ a) * (b @ b)))
+def coherence(u: Array, y: Array) -> float:
+    """Return the part of an output's power that a linear system of any kind can make of the input.
+
+    It is the squared coherence ``|S_uy|^2 / (S_uu S_yy)`` of averaged spectra (Welch 1967), weighted with the
+    power of the output. Unrelated signals have about one over the number of averaged segments.
+
+    Parameters
+    ----------
+    u, y
+        Samples of the input and the output, (samples,).
+
+    Returns
+    -------
+    float
+        A part between 0 and 1; 1 for a record that is too short for segments.
+
+    Examples
+    --------
+    >>> u = np.random.default_rng(0).standard_normal(4000)
+    >>> coherence(u, np.diff(u, prepend=0.0)) > 0.9
+    True
+    """
+    length = len(u) // SEGMENTS
+    if length < SHORTEST:
+        return 1.0
+    own, cross = (signal.csd(x / np.ptp(x), y / np.ptp(y), nperseg=length)[1] for x in (u, y))
+    power = np.abs(cross)  # the last one is that of y alone
+    drive = signal.welch(u / np.ptp(u), nperseg=length)[1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        explained = np.where(drive * power > 0, np.abs(own) ** 2 / drive, 0.0)
+    return float(explained.sum() / power.sum())

@@ -130,7 +130,12 @@ def _next(files: list[str], options: dict[str, Any], notes: list[str]) -> dict[s
 
 
 def _of_record(record: Record, notes: list[str]) -> dict[str, Any]:
-    """Return the properties of the signals of a record."""
+    """Return the properties of the signals of a record. Extreme numbers give infinite properties."""
+    with np.errstate(all="ignore"):
+        return _properties(record, notes)
+
+
+def _properties(record: Record, notes: list[str]) -> dict[str, Any]:
     found = shown(record)
     lengths = [len(u) for u in record.u]
     excitations = [
