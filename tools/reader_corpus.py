@@ -3,6 +3,7 @@
 A mutation is a function of two numbers, the seed of the run and its index, so that each can be made again.
 """
 
+import contextlib
 import gzip
 import io
 import struct
@@ -44,7 +45,7 @@ def signals() -> dict[str, np.ndarray]:
 
 def corpus() -> list[Seed]:
     """Return one file of every kind that the readers distinguish."""
-    return [*texts(), *numpy_files(), *mat_files(), *parquet_files()]
+    return [*texts(), *numpy_files(), *mat_files(), *parquet_files(), *laboratory_files()]
 
 
 def texts() -> Iterator[Seed]:
@@ -138,6 +139,94 @@ def parquet_files() -> Iterator[Seed]:
         stream = io.BytesIO()
         data.write_parquet(stream, compression=compression)
         yield Seed("Parquet", ".parquet", stream.getvalue())
+
+
+def laboratory_files() -> Iterator[Seed]:
+    """Files of measurement programs; those whose library is not installed are left out."""
+    import h5py
+
+    columns = signals()
+    stream = io.BytesIO()
+    with h5py.File(stream, "w") as file:
+        run = file.create_group("run")
+        run.attrs["fs"] = 100.0
+        run.create_dataset("drive", data=columns["u_V"]).attrs["units"] = "V"
+        run.create_dataset("sensor", data=columns["y_um"], chunks=(SAMPLES,), compression="gzip")
+    yield Seed("HDF5", ".h5", stream.getvalue())
+    lines = ["LabVIEW Measurement", "Separator\tTab", "Decimal_Separator\t,", "***End_of_Header***\t", ""]
+    lines += [
+        "Channels\t2\t",
+        "Y_Unit_Label\tVolts\tum\t",
+        "Delta_X\t0,01\t0,01\t",
+        "***End_of_Header***\t\t",
+    ]
+    lines += ["X_Value\tDrive\tSensor\tComment"]
+    lines += [
+        "\t".join(f"{value:.6f}".replace(".", ",") for value in row)
+        for row in zip(*columns.values(), strict=True)
+    ]
+    yield Seed("LVM", ".lvm", "\r\n".join(lines).encode())
+    for make in (workbook, tdms, mdf):
+        with contextlib.suppress(ImportError):
+            yield make(columns)
+
+
+def workbook(columns: dict[str, np.ndarray]) -> Seed:
+    """Return an Excel workbook; the XML of the sheet is mutated in an archive with valid checksums."""
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.append(list(columns))
+    for row in zip(*columns.values(), strict=True):
+        book.active.append([float(value) for value in row])
+    stream = io.BytesIO()
+    book.save(stream)
+    with zipfile.ZipFile(stream) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    sheet = "xl/worksheets/sheet1.xml"
+
+    def pack(content: bytes) -> bytes:
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, data in members.items():
+                # docProps contains the time of writing, which would change the corpus.
+                if not name.startswith("docProps"):
+                    archive.writestr(zipfile.ZipInfo(name), content if name == sheet else data)
+        return packed.getvalue()
+
+    return Seed("XLSX", ".xlsx", members[sheet], pack)
+
+
+def tdms(columns: dict[str, np.ndarray]) -> Seed:
+    import nptdms
+
+    stream = io.BytesIO()
+    with nptdms.TdmsWriter(stream) as writer:
+        writer.write_segment(
+            [
+                nptdms.ChannelObject("run", name, columns[name], {"wf_increment": 0.01})
+                for name in ("u_V", "y_um")
+            ]
+        )
+    return Seed("TDMS", ".tdms", stream.getvalue())
+
+
+def mdf(columns: dict[str, np.ndarray]) -> Seed:
+    import datetime
+
+    import asammdf
+
+    stream = io.BytesIO()
+    with asammdf.MDF(version="4.10") as file:
+        file.start_time = datetime.datetime(2026, 1, 1, tzinfo=datetime.UTC)
+        file.append(
+            [
+                asammdf.Signal(samples=columns[name], timestamps=columns["t_s"], name=name)
+                for name in ("u_V", "y_um")
+            ]
+        )
+        file.save(stream)
+    return Seed("MDF", ".mf4", stream.getvalue())
 
 
 def mutation(seeds: list[Seed], seed: int, index: int) -> tuple[str, bytes]:

@@ -58,6 +58,7 @@ from gpi_hammerstein._native import (
 from gpi_hammerstein.export import export_c, export_rust
 from gpi_hammerstein.files import load_model as load
 from gpi_hammerstein.files import save_model as save
+from gpi_hammerstein.inspection import Inspection, inspect
 from gpi_hammerstein.io import read_record
 from gpi_hammerstein.pickling import register
 
@@ -76,6 +77,7 @@ __all__ = [
     "GpiError",
     "HysteresisFit",
     "Identification",
+    "Inspection",
     "IntermediateSignal",
     "InverseGpi",
     "Model",
@@ -98,6 +100,7 @@ __all__ = [
     "fit_hysteresis",
     "held_steps",
     "identify",
+    "inspect",
     "interop",
     "load",
     "multisine",

@@ -434,3 +434,62 @@ def test_the_command_of_the_attack_reports_counts() -> None:
     found = subprocess.run(words, cwd=tools, capture_output=True, text=True, check=False)
     assert found.returncode == 0, found.stdout + found.stderr
     assert "17 mutated files, seed 1" in found.stdout and "| signal" in found.stdout
+
+
+def test_a_workbook_cannot_repeat_a_text_without_limit(tmp_path: Path) -> None:
+    """A workbook stores a text once, and many cells can refer to it: 300 kB of text become 300 MB."""
+    pytest.importorskip("openpyxl")
+    import reader_corpus
+
+    seed = reader_corpus.workbook(reader_corpus.signals())
+    row = '<row r="{0}"><c r="A{0}" t="s"><v>0</v></c><c r="B{0}"><v>1</v></c><c r="C{0}"><v>2</v></c></row>'
+    sheet = seed.content[: seed.content.index(b"<row")]
+    sheet += "".join(row.format(place) for place in range(1, 1001)).encode() + b"</sheetData></worksheet>"
+    path = tmp_path / "r.xlsx"
+    path.write_bytes(seed.pack(sheet))
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    text = b"x" * 300_000
+    members["xl/sharedStrings.xml"] = (
+        b'<sst xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><si><t>'
+        + text
+        + b"</t></si></sst>"
+    )
+    kind = b"application/vnd.openxmlformats-officedocument.spreadsheetml.sharedStrings+xml"
+    entry = b'<Override PartName="/xl/sharedStrings.xml" ContentType="' + kind + b'"/></Types>'
+    types = "[Content_Types].xml"
+    if b"sharedStrings" not in members[types]:
+        members[types] = members[types].replace(b"</Types>", entry)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+    refused(path, "times as large as the file")
+
+
+def test_a_workbook_of_claimed_size_is_read_in_its_real_size(tmp_path: Path) -> None:
+    pytest.importorskip("openpyxl")
+    import reader_corpus
+
+    seed = reader_corpus.workbook(reader_corpus.signals())
+    path = tmp_path / "r.xlsx"
+    path.write_bytes(seed.pack(seed.content.replace(b'ref="A1:C61"', b'ref="A1:XFD1048576"')))
+    assert b"XFD1048576" not in seed.content and read(path) == ("read", "")
+    far = seed.content.replace(b'<c r="C61"', b'<c r="XFD61"')
+    assert far != seed.content
+    path.write_bytes(seed.pack(far))
+    refused(path, "has 16384 columns, more than 1000")
+
+
+def test_groups_of_hdf5_that_form_a_circle_are_read_once(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    with h5py.File(path, "w") as file:
+        run = file.create_group("run")
+        run["u_V"], run["y_um"] = U, Y
+        run.attrs["dt"] = 0.5
+        run["again"] = file  # a hard link to the root
+    recording = read_recording(path)
+    assert recording.rate == 2.0
+    np.testing.assert_array_equal(recording.runs[0].u[:, 0], U)
+    with h5py.File(path, "a") as file:
+        file["soft"] = h5py.SoftLink("/run/u_V")
+    refused(path, "a link to another object or file")

@@ -53,7 +53,8 @@ def test_pandas_there_and_back(record):
     assert same(gpi.read_record(frame.set_index(pd.TimedeltaIndex(clock, name=None))), record)
     frame["note"] = "text"
     with pytest.raises(gpi.DataError, match="column `note` holds text"):
-        gpi.read_record(frame, rate=RATE)
+        gpi.read_record(frame, rate=RATE, covariate="note")
+    assert "note" not in gpi.read_record(frame, rate=RATE).covariate_names
 
 
 def test_xarray_there_and_back(record):

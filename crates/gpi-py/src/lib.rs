@@ -16,6 +16,7 @@ mod plotting;
 mod progress;
 mod record;
 mod rivals;
+mod signs;
 
 use pyo3::prelude::*;
 
@@ -31,5 +32,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     identify::register(module)?;
     explain::register(module)?;
     rivals::register(module)?;
+    signs::register(module)?;
     excitation::register(module)
 }

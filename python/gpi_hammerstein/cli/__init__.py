@@ -16,6 +16,7 @@ from gpi_hammerstein.cli.excite import excite
 from gpi_hammerstein.cli.explain import explain
 from gpi_hammerstein.cli.export import export
 from gpi_hammerstein.cli.identify import identify
+from gpi_hammerstein.cli.inspect import inspect
 from gpi_hammerstein.cli.output import complain
 from gpi_hammerstein.cli.report import report
 from gpi_hammerstein.cli.reproduce import reproduce
@@ -30,7 +31,7 @@ app: typer.Typer = typer.Typer(
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     help="Identify piezo and other smart-material actuators from measured data.\n\n"
-    "To start, run `gpi demo`. Then run `gpi report` with a record of your own.",
+    "To start, run `gpi demo`. Then run `gpi inspect` with a record of your own.",
     epilog="Exit codes: 0 success, 2 wrong call, 3 unusable data, 130 interrupted, 143 terminated, "
     "1 any other error.",
 )
@@ -53,6 +54,7 @@ def _options(
 
 EXAMPLES: dict[Callable[..., Any], str] = {
     demo: "gpi demo -o out/demo",
+    inspect: "gpi inspect run.csv",
     identify: "gpi identify run.csv --input u_V --output y_um -o model",
     explain: "gpi explain run.csv --holdout-record other.csv -o explained --report",
     report: "gpi report run.csv",

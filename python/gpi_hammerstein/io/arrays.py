@@ -1,5 +1,6 @@
 """Columns from named arrays, which NumPy and MATLAB files contain."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +11,9 @@ from gpi_hammerstein._native import DataError
 from gpi_hammerstein.io.boundary import File
 from gpi_hammerstein.io.columns import Column, parse_header
 from gpi_hammerstein.io.tables import Array, Table
+from gpi_hammerstein.io.vocabulary import score
 
+SIGNAL_ROLES = ("input", "output", "time")
 RATES = ("rate", "fs", "fs_hz", "rate_hz", "sampling_rate")
 PERIODS = ("ts", "dt", "ts_s", "dt_s")
 
@@ -80,9 +83,10 @@ def from_arrays(arrays: Mapping[str, Any], file: File) -> list[Table]:
                 left_out[name] = "text"
             continue
         if array.size == 1:
-            if name.lower() in RATES:
+            last = name.rsplit("/", 1)[-1].lower()  # the name of a group may stand before it
+            if last in RATES:
                 rate = float(array.item())
-            elif name.lower() in PERIODS:
+            elif last in PERIODS:
                 rate = 1.0 / float(array.item()) if array.item() else np.inf
             continue
         with np.errstate(over="ignore"):  # an infinite sample is refused later, with its row
@@ -91,13 +95,7 @@ def from_arrays(arrays: Mapping[str, Any], file: File) -> list[Table]:
         others = "".join(f"; `{name}` contains {what}" for name, what in left_out.items())
         raise DataError(f"{source}: no array of samples; a record needs arrays such as `u` and `y`{others}")
     file.allowance.check_columns(sum(array.shape[1] for array in signals.values()))
-    first, *others_named = signals
-    for name in others_named:
-        if len(signals[name]) != len(signals[first]):
-            raise DataError(
-                f"{source}: `{first}` has {len(signals[first])} samples, but `{name}` has "
-                f"{len(signals[name])}; the lengths must be equal"
-            )
+    _require_one_length(signals, left_out, source)
     return [
         Table(
             f"{source} (realisation {index})" if count > 1 else source,
@@ -109,6 +107,22 @@ def from_arrays(arrays: Mapping[str, Any], file: File) -> list[Table]:
         )
         for index, (columns, warmup, count) in enumerate(_realisations(signals, source))
     ]
+
+
+def _require_one_length(signals: dict[str, Array], left_out: dict[str, str], source: str) -> None:
+    """Remove arrays of another length from `signals`, unless they are named as a part of the record."""
+    lengths = Counter(len(array) for array in signals.values())
+    named = [name for name in signals if any(score(parse_header(name), role)[0] for role in SIGNAL_ROLES)]
+    first = named[0] if named else max(signals, key=lambda name: lengths[len(signals[name])])
+    for name in list(signals):
+        if len(signals[name]) == len(signals[first]):
+            continue
+        if name in named:
+            raise DataError(
+                f"{source}: `{first}` has {len(signals[first])} samples, but `{name}` has "
+                f"{len(signals[name])}; the lengths must be equal"
+            )
+        left_out[name] = f"{len(signals.pop(name))} values, and `{first}` {len(signals[first])}"
 
 
 def _samples_first(array: Array, name: str, source: str) -> Array:

@@ -14,10 +14,11 @@ GAP_STEPS = 10.0
 # A finer grid is most likely a wrong unit, and would need too much memory.
 MOST_REFINED = 100.0
 
-HINT = (
-    "; use --resample auto (resample=True): it cuts the record where the clock pauses or jumps back, and "
-    "interpolates linearly between the cuts"
-)
+# A larger part of rows with the stamp of the row above comes from rounded stamps, not from single repeated
+# rows.
+ROUNDED = 0.05
+# A larger part of rows that go back in time is no clock that was set back.
+BACKWARD = 0.1
 
 
 @dataclass(frozen=True)
@@ -61,12 +62,32 @@ def uniform_rate(stamps: Array, source: str) -> float:
     try:
         rate, _ = time_axis(stamps)
     except DataError as error:
-        hint = HINT if len(stamps) > 2 else ""
-        raise DataError(f"{source}: {error}{hint}") from error
+        raise DataError(f"{source}: {error}{_advice(stamps)}") from error
     if not np.isfinite(rate):
         raise DataError(f"{source}: the time stamps are too close for a sampling rate; correct their unit")
     whole = float(round(rate))
     return whole if whole and abs(rate - whole) <= 1e-6 * rate else rate
+
+
+def _advice(stamps: Array) -> str:
+    """Return what helps with stamps that are not uniform."""
+    steps = np.diff(stamps)
+    if steps.size < 2 or not np.isfinite(steps).all():
+        return ""
+    backward = int(np.count_nonzero(steps < 0))
+    if backward > max(2, BACKWARD * steps.size) or not (steps > 0).any():
+        return "; this column is no clock: name another one with --time, or give the rate in Hz with --rate"
+    repeated = float(np.mean(steps == 0))
+    if repeated > ROUNDED and not (steps < 0).any():
+        mean = steps.size / (stamps[-1] - stamps[0])
+        return (
+            f"; {100 * repeated:.3g} % of the rows have the stamp of the row above, because the stamps are "
+            f"rounded: give the rate with --rate, on average it is {mean:.6g} Hz"
+        )
+    return (
+        "; use --resample auto (resample=True): it cuts the record where the clock pauses or jumps back, and "
+        "interpolates linearly between the cuts"
+    )
 
 
 def resample(stamps: Array, columns: Array, rate: float | None, source: str) -> Resampled:

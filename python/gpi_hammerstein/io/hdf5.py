@@ -1,4 +1,4 @@
-"""Reading of MAT files of version 7.3, which are HDF5 files.
+"""Reading of HDF5 files: MAT files of version 7.3, and files of other programs.
 
 The library of HDF5 can open other files that a file names: by external links, by external storage of a
 dataset, and by virtual datasets. All of them are refused, and so are soft links, because a record needs none:
@@ -6,12 +6,14 @@ only what the file itself contains is read.
 """
 
 import io
+from collections import Counter
 from typing import Any
 
 import numpy as np
 
-from gpi_hammerstein.io.arrays import LeftOut
+from gpi_hammerstein.io.arrays import PERIODS, RATES, LeftOut, from_arrays
 from gpi_hammerstein.io.boundary import File
+from gpi_hammerstein.io.tables import Table
 
 
 def read_hdf5(file: File) -> dict[str, Any]:
@@ -60,10 +62,111 @@ def read_hdf5(file: File) -> dict[str, Any]:
     return variables
 
 
-def _array(dataset: Any, name: str, file: File) -> Any:
-    """Return the array of a dataset."""
+def read_plain_hdf5(file: File) -> list[Table]:
+    """Read an HDF5 file of any program.
+
+    Parameters
+    ----------
+    file
+        The file, with datasets of the shapes of :func:`~gpi_hammerstein.io.arrays.from_arrays` in any groups.
+        A dataset is called by its own name, or by its path if several have this name. A table (a dataset with
+        fields) gives one column for each field. The attributes ``units`` or ``unit`` of a dataset, and
+        ``rate``, ``fs`` or ``dt`` of a dataset or group, are used.
+
+    Returns
+    -------
+    list of Table
+        One table for each experiment.
+
+    Raises
+    ------
+    DataError
+        The data is larger than allowed, or there is no array of samples.
+    ValueError, OSError, RuntimeError, KeyError
+        The file is corrupt, or refers to other files.
+
+    Examples
+    --------
+    >>> with opened(Path("record.h5"), "HDF5") as file:  # doctest: +SKIP
+    ...     read_plain_hdf5(file)[0].headers()
+    """
+    import h5py
+
+    found: dict[str, Any] = {}
+    scalars: dict[str, Any] = {}
+    pending: list[tuple[str, Any]] = []
+    with h5py.File(io.BytesIO(file.data), "r") as root:
+        pending.append(("", root))
+        seen: set[Any] = set()
+        while pending:
+            path, item = pending.pop(0)
+            if item.id in seen:  # hard links can form a circle
+                continue
+            seen.add(item.id)
+            file.allowance.check_columns(len(seen))
+            scalars |= _rates(item)
+            if isinstance(item, h5py.Group):
+                for name in item:
+                    if not isinstance(item.get(name, getlink=True), h5py.HardLink):
+                        raise ValueError(
+                            f"`{name}` is a link to another object or file, which is not followed"
+                        )
+                    pending.append((f"{path}/{name}" if path else name, item[name]))
+            elif isinstance(item, h5py.Dataset):
+                if (
+                    item.dtype.names
+                    and item.ndim == 1
+                    and all(item.dtype[n].kind in "fiub" for n in item.dtype.names)
+                ):
+                    _require_inside(item, path)
+                    file.allowance.spend(item.size * item.dtype.itemsize)
+                    values = item[()]
+                    found |= {f"{path}/{field}": values[field] for field in item.dtype.names}
+                else:
+                    unit = _text(item.attrs.get("units", item.attrs.get("unit", "")))
+                    found[f"{path} [{unit}]" if unit else path] = _array(item, path, file, axes=1)
+    return from_arrays(
+        _short(found) | {name: value for name, value in scalars.items() if name not in found}, file
+    )
+
+
+def _rates(item: Any) -> dict[str, float]:
+    """Return the attributes that state the rate."""
+    found = {}
+    for name in item.attrs:
+        if name.lower() in (*RATES, *PERIODS):
+            value = np.asarray(item.attrs[name])
+            if value.size == 1 and value.dtype.kind in "fiu":
+                found[name] = float(value.item())
+    return found
+
+
+def _short(found: dict[str, Any]) -> dict[str, Any]:
+    """Call arrays by the last part of their path where it is unique."""
+    last = Counter(_last(name) for name in found)
+    return {_last(name) if last[_last(name)] == 1 else name: value for name, value in found.items()}
+
+
+def _last(name: str) -> str:
+    path, bracket, unit = name.partition(" [")
+    return path.rsplit("/", 1)[-1] + bracket + unit
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    return value if isinstance(value, str) else ""
+
+
+def _require_inside(dataset: Any, name: str) -> None:
+    """Refuse a dataset whose numbers are in another file."""
     if dataset.external or dataset.is_virtual:
         raise ValueError(f"the numbers of `{name}` are in another file, which is not read")
+
+
+def _array(dataset: Any, name: str, file: File, axes: int = -1) -> Any:
+    """Return the array of a dataset; MATLAB's axes are reversed (`axes` = -1)."""
+    _require_inside(dataset, name)
     if dataset.dtype.kind not in "fiub":
         return LeftOut("complex numbers" if dataset.dtype.names else "no numbers")
     if dataset.attrs.get("MATLAB_class", b"") == b"char":
@@ -75,4 +178,5 @@ def _array(dataset: Any, name: str, file: File) -> Any:
     file.allowance.spend(dataset.size * dataset.dtype.itemsize)
     if dataset.size and not dataset.id.get_storage_size():
         raise ValueError(f"the numbers of `{name}` were never written")
-    return np.asarray(dataset[()]).T
+    values = np.asarray(dataset[()])
+    return values.T if axes < 0 else values

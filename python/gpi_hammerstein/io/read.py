@@ -1,28 +1,12 @@
 """Reading of records from files."""
 
-import os
 from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from gpi_hammerstein._native import DataError, ParameterError, Record
-from gpi_hammerstein.io.clock import resample as put_on_grid
-from gpi_hammerstein.io.clock import uniform_rate
-from gpi_hammerstein.io.columns import TIME_UNITS, Column, Roles, assign_roles
-from gpi_hammerstein.io.formats import output_files, read_tables
-from gpi_hammerstein.io.frames import Frame, is_frame, read_frame
-from gpi_hammerstein.io.npy import read_npy_pair
-from gpi_hammerstein.io.recording import Recording, Run
-from gpi_hammerstein.io.tables import Table
-
-# The seconds since 1970 have this value in the year 5138; larger stamps are in another unit.
-LATEST_SECOND = 1e11
-
-PathLike = str | os.PathLike[str]
-Names = str | Sequence[str]
+from gpi_hammerstein._native import ParameterError, Record
+from gpi_hammerstein.io.experiments import recording_of
+from gpi_hammerstein.io.frames import Frame
+from gpi_hammerstein.io.recording import Recording
+from gpi_hammerstein.io.sources import Names, PathLike, read_sources
 
 
 def read_record(
@@ -43,22 +27,24 @@ def read_record(
     ----------
     path
         A file, or a list of files with the same columns, whose experiments are put in one record. Formats are
-        CSV (``.csv``, ``.csv.gz``, also separated by semicolons or tabs), Parquet (``.parquet``), NumPy
-        (``.npz``, ``.npy``) and MATLAB v4, v5 or v7.3 (``.mat``). Arrays in NumPy and MATLAB files have
-        the shape (samples,), (samples, channels), (samples, channels, realisations) or (samples, channels,
-        realisations, periods). Every realisation is an experiment; all of its periods except the last one are
-        warm-up. A Polars or pandas data frame or an xarray dataset, with columns named as in a CSV file, is
-        also accepted.
+        CSV (``.csv``, ``.csv.gz``, also separated by semicolons, tabs or spaces), Excel (``.xlsx``), Parquet
+        (``.parquet``), NumPy (``.npz``, ``.npy``), MATLAB v4, v5 or v7.3 (``.mat``), HDF5 (``.h5``), LabVIEW
+        (``.lvm``, ``.tdms``) and MDF (``.mf4``). Excel, TDMS and MDF need the extras ``xlsx``, ``tdms`` and
+        ``mdf``. Arrays in NumPy, MATLAB and HDF5 files have the shape (samples,), (samples, channels),
+        (samples, channels, realisations) or (samples, channels, realisations, periods). Every realisation is
+        an experiment; all of its periods except the last one are warm-up. A Polars or pandas data frame or an
+        xarray dataset, with columns named as in a CSV file, is also accepted.
     input, output, covariate
         Names of the columns with or without their unit: ``"u_V"`` or ``"u"``. If they are not given, columns
-        are recognised by their names. Inputs: ``u``, ``u1``, ``input``, else ``voltage``, ``drive``,
-        ``command``. Outputs: ``y``, ``y1``, ``output``, else ``position``, ``displacement``. Every other
-        column is a covariate (``covariate=[]`` ignores them). A ``.npy`` file contains only the input;
-        `output` is then the path of the file with the output. For several ``.npy`` files, give one output
-        file for each of them.
+        are recognised by words in their names and by their units, and a note says why. Inputs: ``u``, ``u1``,
+        ``input``, else words such as ``voltage``, ``drive``, ``command``. Outputs: ``y``, ``y1``, ``output``,
+        else words such as ``position``, ``sensor``. Every other column with only numbers is a covariate
+        (``covariate=[]`` ignores them). A ``.npy`` file contains only the input; `output` is then the path of
+        the file with the output. For several ``.npy`` files, give one output file for each of them.
     time
-        Name of the time column; ``t`` and ``time`` are recognised. The unit is the text after the last
-        underscore (``t_ms``); without a unit, it is s.
+        Name of the time column; ``t``, ``time`` and similar names are recognised. The unit is part of the
+        name (``t_ms``, ``Time (ms)``); without a unit, it is s. Dates and times of day are converted to
+        seconds.
     rate
         Sampling rate in Hz; it replaces the time column.
     warmup
@@ -67,7 +53,7 @@ def read_record(
     resample
         A rate in Hz, or True (or ``"auto"``) for the rate of the median step. Makes non-uniform sampling
         uniform by linear interpolation, and cuts the record into several experiments at gaps and where the
-        clock jumps back.
+        clock jumps back. Rows in which a used column has no number are left out.
     experiment
         Experiments to keep, numbered from 0: ``3``, ``[0, 2]``, ``"0-4,7"``.
 
@@ -90,11 +76,11 @@ def read_record(
     -----
     Four limits protect against files that exhaust memory or time. They are environment variables:
     ``GPI_MAX_READ_BYTES`` (1073741824), the size of the data of one file after decompression;
-    ``GPI_MAX_READ_RATIO`` (100), the ratio of this size to the size of the file, if the data has more than
-    16 MiB; ``GPI_MAX_READ_COLUMNS`` (1000), the number of columns or variables of one file;
-    ``GPI_MAX_READ_SECONDS`` (120), the time for a Parquet or HDF5 file. These two formats are read in another
-    process, because their libraries can end a process if a file is corrupt. An HDF5 file that refers to other
-    files is refused.
+    ``GPI_MAX_READ_RATIO`` (100), the ratio of this size to the size of the file, if the data has more than 16
+    MiB; ``GPI_MAX_READ_COLUMNS`` (1000), the number of columns or variables of one file;
+    ``GPI_MAX_READ_SECONDS`` (120), the time for a Parquet, HDF5, Excel, TDMS or MDF file. These formats are
+    read in another process, because their libraries can end a process or block it if a file is corrupt. An
+    HDF5 file that refers to other files is refused.
 
     Examples
     --------
@@ -158,124 +144,13 @@ def read_recording(
         )
     if warmup is not None and warmup < 0:
         raise ParameterError(f"`warmup` = {warmup}: must be a number of samples, zero or larger")
-    given: list[Any] = [path] if is_frame(path) or isinstance(path, str | os.PathLike) else [*path]
-    sources = [one if is_frame(one) else Path(one) for one in given]
-    if not sources:
-        raise ParameterError("`path`: no file is given; give at least one record")
-    files = output_files([one for one in sources if isinstance(one, Path)], _names(output))
-    parts = []
-    for one in sources:
-        outputs = _names(output)
-        if is_frame(one):
-            tables = [read_frame(one)]
-        elif files:
-            tables, outputs = read_npy_pair(one, files.get(one)), None
-        else:
-            tables = read_tables(one)
-        for table in tables:
-            roles = assign_roles(
-                table.headers(),
-                source=table.source,
-                time=time,
-                inputs=_names(input),
-                outputs=outputs,
-                covariates=_names(covariate),
-                need_time=rate is None and table.rate is None,
-                left_out=table.left_out,
-            )
-            parts.append(_read_part(table, roles, rate, resample, warmup))
-    names = [str(one) if isinstance(one, Path) else "the data frame" for one in sources]
-    return _join(parts, names).select(experiment)
-
-
-def _names(names: Names | None) -> list[str] | None:
-    return None if names is None else [names] if isinstance(names, str) else list(names)
-
-
-def _read_part(
-    table: Table, roles: Roles, rate: float | None, resample: bool | float | str | None, warmup: int | None
-) -> Recording:
-    """Divide one table into experiments."""
-    signals = [*roles.inputs, *roles.outputs, *roles.covariates]
-    table.require_numbers(signals)
-    samples = table.stack(signals)
-    pieces, notes, starts = [samples], [*table.notes], [0.0]
-    notes += [f"`{name}` is left out: it contains {what}" for name, what in table.left_out.items()]
-    given = rate or table.rate
-    if roles.time is not None and rate is None:
-        table.require_numbers([roles.time])
-        stamps = table.columns[roles.time] * TIME_UNITS.get(roles.time.unit, 1.0)
-        if resample:
-            if isinstance(resample, str) and resample != "auto":
-                raise ParameterError(
-                    f"`resample` = {resample}: must be a rate in Hz, or `auto` for that of the median step"
-                )
-            asked = None if isinstance(resample, bool | str) else float(resample)
-            found = put_on_grid(stamps, samples, asked, table.source)
-            pieces, given = found.pieces, found.rate
-            notes.append(found.note)
-            starts = [0.0] * len(pieces)
-        else:
-            if not roles.time.unit and abs(stamps[0]) > LATEST_SECOND:
-                raise DataError(
-                    f"{table.source}: `{roles.time.header}` starts at {stamps[0]:.15g}, which is no time in "
-                    f"seconds; add its unit to the name, as in `{roles.time.header}_ms`"
-                )
-            given, starts = uniform_rate(stamps, table.source), [float(stamps[0])]
-            if not roles.time.unit and (stamps == np.rint(stamps)).all():
-                notes.append(
-                    f"`{roles.time.header}` contains only integers and has no unit: taken as seconds, "
-                    f"{given:g} Hz; if it counts samples, give the rate in Hz (--rate)"
-                )
-    elif resample:
-        raise ParameterError(
-            f"`resample`: {table.source} has no time stamps, which resampling needs; give the rate (--rate)"
-        )
-    assert given is not None  # assign_roles requires a time column otherwise
-    if not (np.isfinite(given) and given > 0):
-        raise DataError(
-            f"{table.source}: the file states a sampling rate of {given:g} Hz, which must be positive and "
-            "finite; give the rate in Hz with rate= (--rate)"
-        )
-    inputs, outputs = len(roles.inputs), len(roles.outputs)
-    start_of_covariates = inputs + outputs
-    runs = [
-        Run(
-            piece[:, :inputs],
-            piece[:, inputs:start_of_covariates],
-            piece[:, start_of_covariates:],
-            table.warmup if warmup is None else warmup,
-            start,
-        )
-        for piece, start in zip(pieces, starts, strict=True)
-    ]
-    return Recording(runs, given, roles.inputs, roles.outputs, roles.covariates, notes)
-
-
-def _join(parts: Sequence[Recording], sources: Sequence[str]) -> Recording:
-    """Put all experiments in one recording."""
-    first, *others = parts
-    runs, notes = list(first.runs), list(first.notes)
-    where = f"{sources[0]} and {sources[-1]}" if len(sources) > 1 else sources[0]
-    for part in others:
-        if abs(part.rate - first.rate) > 1e-3 * first.rate:
-            raise DataError(
-                f"{where}: sampled at {first.rate:g} and {part.rate:g} Hz; resample to one rate (--resample)"
-            )
-        for what, ours, theirs in (
-            ("inputs", first.inputs, part.inputs),
-            ("outputs", first.outputs, part.outputs),
-            ("covariates", first.covariates, part.covariates),
-        ):
-            if _labels(ours) != _labels(theirs):
-                raise DataError(
-                    f"{where}: {what} differ: {', '.join(_labels(ours)) or 'none'} and "
-                    f"{', '.join(_labels(theirs)) or 'none'}; name columns that both files have"
-                )
-        runs += part.runs
-        notes += part.notes
-    return replace(first, runs=runs, notes=notes)
-
-
-def _labels(columns: Sequence[Column]) -> list[str]:
-    return [column.header for column in columns]
+    found = read_sources(path, output)
+    return recording_of(
+        found,
+        input=input,
+        time=time,
+        rate=rate,
+        covariate=covariate,
+        warmup=warmup,
+        resample=resample,
+    ).select(experiment)

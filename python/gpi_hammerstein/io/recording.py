@@ -38,7 +38,13 @@ class Recording:
     outputs: list[Column]
     covariates: list[Column]
     notes: list[str] = field(default_factory=list)
-    """Notes on changes of the samples while they were read."""
+    """Notes on changes of the samples while they were read, and on guesses."""
+    undecided: list[Column] = field(default_factory=list)
+    """Columns of which each may be the output, so that none was taken."""
+    why: dict[str, str] = field(default_factory=dict)
+    """Why each guessed column was taken for its role, by its header."""
+    time: Column | None = None
+    """The column of the time; None if there is none or the rate was given."""
 
     def record(self) -> Record:
         """Return the record for the identification.
@@ -49,7 +55,10 @@ class Recording:
             The output was not measured.
         """
         if not self.outputs:
-            raise DataError("the record has no output column; name one with output= (--output)")
+            others = [column.header for column in self.undecided or self.covariates]
+            which = "each of these may be it" if self.undecided else "the other columns are"
+            there = f"; {which}: {', '.join(others)}" if others else ""
+            raise DataError(f"the record has no output column; name one with output= (--output){there}")
         return Record(
             [run.u for run in self.runs],
             [run.y for run in self.runs],

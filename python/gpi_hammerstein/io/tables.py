@@ -1,7 +1,7 @@
 """Tables of numbers: what every format is converted to."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import polars as pl
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gpi_hammerstein._native import DataError
 from gpi_hammerstein.escaping import visible
+from gpi_hammerstein.io.calendar_time import clocks_as_seconds
 from gpi_hammerstein.io.columns import Column, parse_header
 from gpi_hammerstein.io.header import DECIMAL_COMMA
 
@@ -36,28 +37,57 @@ class Table:
         """Return all columns."""
         return [*self.columns, *self.text]
 
-    def require_numbers(self, columns: Sequence[Column]) -> None:
+    def unusable(self) -> dict[Column, str]:
+        """Return the columns that contain something else than numbers, and what."""
+        found = dict(self.text)
+        for column, samples in self.columns.items():
+            bad = int(np.count_nonzero(~np.isfinite(samples)))
+            if bad:
+                empty = "no numbers" if bad == len(samples) else f"{bad} NaN, infinite or empty samples"
+                found[column] = empty
+        return found
+
+    def complete_rows(self, columns: Sequence[Column]) -> NDArray[np.bool_]:
+        """Return which rows have a number in each of `columns`."""
+        rows = len(next(iter(self.columns.values())))
+        whole = np.ones(rows, dtype=bool)
+        for column in columns:
+            if column in self.columns:
+                whole &= np.isfinite(self.columns[column])
+        return whole
+
+    def require_numbers(self, columns: Sequence[Column], *, has_clock: bool = False) -> None:
         """Reject text, NaN and infinite samples in `columns`.
 
         Raises
         ------
         DataError
-            The message states the column and the rows, which are counted from 0.
+            The message states the column, the rows, which are counted from 0, and what to do. `has_clock`
+            says whether time stamps allow to leave rows out.
         """
         for column in columns:
             if column in self.text:
                 raise DataError(
                     f"{self.source}: column `{column.header}` holds {self.text[column]} "
-                    "(the rows below the names are counted from 0); correct or remove such rows; if the "
-                    "column is no input, output or time, ignore it (covariate=[], --covariate none)"
+                    "(the rows below the names are counted from 0); correct or remove such rows"
                 )
             rows = np.flatnonzero(~np.isfinite(self.columns[column]))
+            if rows.size == len(self.columns[column]):
+                raise DataError(
+                    f"{self.source}: column `{column.header}` contains no numbers; name another column "
+                    "(--input, --output, --time)"
+                )
             if rows.size:
                 shown = ", ".join(map(str, rows[:5])) + (", .." if rows.size > 5 else "")
+                advice = "correct these rows"
+                if has_clock:
+                    advice += (
+                        ", or leave them out with --resample auto (resample=True): it interpolates over a "
+                        "few rows, and cuts the record where more are missing"
+                    )
                 raise DataError(
                     f"{self.source}: column `{column.header}` has {rows.size} NaN, infinite or empty "
-                    f"samples, in rows {shown} (counted from 0 below the names); correct these rows, or "
-                    "remove them and read the rest with --resample auto (resample=True)"
+                    f"samples, in rows {shown} (counted from 0 below the names); {advice}"
                 )
 
     def stack(self, columns: Sequence[Column]) -> Array:
@@ -97,6 +127,7 @@ def from_frame(frame: pl.DataFrame, source: str) -> Table:
         )
     columns: dict[Column, Array] = {}
     text: dict[Column, str] = {}
+    frame, clocks = clocks_as_seconds(frame)
     frame, wrong = _numbers_of_texts(frame)
     numeric = [name for name, kind in frame.schema.items() if kind.is_numeric() or kind == pl.Boolean]
     # All columns at once, because a call for each of many columns is slow.
@@ -104,6 +135,8 @@ def from_frame(frame: pl.DataFrame, source: str) -> Table:
     there = dict(zip(numbers.columns, numbers.get_columns(), strict=True))
     for name, kind in frame.schema.items():
         column = parse_header(name)
+        if name in clocks:
+            column = replace(column, unit="s")
         if name in there:
             columns[column] = there[name].to_numpy().astype(np.float64)
         else:

@@ -5,14 +5,18 @@ import io
 from collections import Counter
 from dataclasses import replace
 
+import numpy as np
 import polars as pl
 
 from gpi_hammerstein._native import DataError
 from gpi_hammerstein.io.boundary import File
+from gpi_hammerstein.io.columns import parse_header
 from gpi_hammerstein.io.compressed import GZIP, inflate
 from gpi_hammerstein.io.forked import require_threads
-from gpi_hammerstein.io.header import find_header, is_number
+from gpi_hammerstein.io.header import find_header
+from gpi_hammerstein.io.nameless import name_by_content
 from gpi_hammerstein.io.tables import Table, from_frame
+from gpi_hammerstein.io.vocabulary import score
 
 GZIP_MAGIC = b"\x1f\x8b"
 FLOAT64_BYTES = 8
@@ -24,10 +28,10 @@ def read_csv(file: File) -> list[Table]:
     Parameters
     ----------
     file
-        The file, separated by commas, semicolons or tabs, in UTF-8, Latin-1, or UTF-16 with a byte order
-        mark. The names are the last line above the numbers, or the line above a line of units. Lines above
-        the names and lines that start with ``#`` are skipped. If the separator is not a comma, numbers may
-        have a decimal comma.
+        The file, separated by commas, semicolons, tabs or spaces, in UTF-8, Latin-1, or UTF-16 with a byte
+        order mark. The names are the last line above the numbers, or the line above a line of units. Lines
+        above the names and lines that start with ``#`` are skipped. If the separator is not a comma, numbers
+        may have a decimal comma.
 
     Returns
     -------
@@ -37,7 +41,7 @@ def read_csv(file: File) -> list[Table]:
     Raises
     ------
     DataError
-        The file is empty, has no header, has more columns than the limit, or has rows with more cells than
+        The file is empty, has more columns than the limit, or has rows with more cells than
         the header.
 
     Examples
@@ -54,17 +58,43 @@ def read_csv(file: File) -> list[Table]:
             f"{path}: not a text file; a CSV record is text, in UTF-8, Latin-1, or UTF-16 with a byte order "
             "mark"
         )
+    return [table_of_text(text, file)]
+
+
+def table_of_text(text: str, file: File) -> Table:
+    r"""Convert the text of a table.
+
+    Parameters
+    ----------
+    text
+        Names and rows; see :func:`~gpi_hammerstein.io.header.find_header`.
+    file
+        The file that contains the text.
+
+    Returns
+    -------
+    Table
+        The columns. Columns without a name and without numbers are dropped.
+
+    Raises
+    ------
+    DataError
+        As for :func:`read_csv`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from gpi_hammerstein.io.limits import Allowance
+    >>> file = File(Path("demo"), b"", Allowance(Path("demo"), 0))
+    >>> [column.name for column in table_of_text("t,u\n0,1\n", file).headers()]
+    ['t', 'u']
+    """
+    path = file.path
     header = find_header(text)
     if header is None:
         raise DataError(f"{path}: the file is empty; a record has a header line and one row for each sample")
-    names = header.names
-    file.allowance.check_columns(len(names))
-    if all(map(is_number, names)):
-        first = header.separator.join(names)[:60]
-        raise DataError(f"{path}: no header line (row 0 reads `{first}`); add one such as `t_s,u_V,y_um`")
-    [(repeated, times), *_] = Counter(names).most_common(1)
-    if times > 1:
-        raise DataError(f"{path}: {times} columns are named `{repeated}`; rename them")
+    file.allowance.check_columns(len(header.names))
+    names, renamed = _unique(header.names, str(path))
     if not header.rows:
         raise DataError(
             f"{path}: no rows below the header line `{header.separator.join(names)[:60]}`; a record has one "
@@ -79,7 +109,35 @@ def read_csv(file: File) -> list[Table]:
         comment_prefix="#",
         infer_schema=False,
     )
-    return [replace(from_frame(frame, str(path)), notes=header.notes)]
+    table = from_frame(frame, str(path))
+    nameless = {name for name, given in zip(names, header.names, strict=True) if not given}
+    empty = [c for c in table.columns if c.header in nameless and not np.isfinite(table.columns[c]).any()]
+    columns = {column: samples for column, samples in table.columns.items() if column not in empty}
+    table = replace(table, columns=columns or table.columns, notes=[*header.notes, *renamed])
+    return table if header.is_named else name_by_content(table)
+
+
+def _unique(names: list[str], source: str) -> tuple[list[str], list[str]]:
+    """Give columns without a name their number, and columns with the same name an addition.
+
+    Two columns whose name is that of an input, an output or the time are refused, because nobody can tell
+    which one is meant.
+    """
+    counts = Counter(name for name in names if name)
+    for name, times in counts.items():
+        if times > 1 and any(score(parse_header(name), role)[0] for role in ("time", "input", "output")):
+            raise DataError(f"{source}: {times} columns are named `{name}`; rename them")
+    found: dict[str, None] = {}
+    for place, name in enumerate(names, 1):
+        unique = name or f"column{place}"
+        while unique in found or (unique != name and unique in counts):
+            unique += f".{place}"
+        found[unique] = None
+    repeated = [name for name, times in counts.items() if times > 1]
+    notes = [
+        f"{counts[name]} columns are named `{name}`; a number was added to the others" for name in repeated
+    ]
+    return list(found), notes
 
 
 def read_parquet(file: File) -> list[Table]:

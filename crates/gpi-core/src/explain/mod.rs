@@ -48,6 +48,7 @@ use crate::{Error, Matrix, Record};
 use explanation::summarise;
 pub use explanation::{Errors, Explanation, Step};
 pub use moved_resonance::Resonance;
+pub use outside::{Signs, signs};
 use policy::{FitPolicy, GridPolicy, SearchPolicy};
 pub use residual::{ResidualOptions, ResidualTest, Significance, residual_tests};
 use setup::SearchSetup;

@@ -10,7 +10,10 @@ mod integration;
 #[cfg(test)]
 mod plants;
 mod saturation;
+mod signs;
 mod winner;
+
+pub use signs::{Signs, signs};
 
 use super::policy::OutsidePolicy;
 use crate::rivals::{Fitted, RivalPolicy, Units};
