@@ -104,7 +104,7 @@ pub fn explain(
     let spikes = outliers::places(&outputs, &repair::everything(&training)?, 0);
     let training = repair::repaired(&training, &outputs, &spikes)?;
     let steps = ProgressSettings::usual()?;
-    let mut overall = Overall::new(progress, steps.declared, steps.structures);
+    let mut overall = Overall::new(progress, steps.light, steps.declared, steps.declaring);
     let mut prepared = prepare(&training, &identify)?;
     let measured = as_measured(&prepared.record, record, &prepared.means)?;
     let mut progress = |report: &Report| overall.take(report);
@@ -138,7 +138,7 @@ pub fn explain(
         }
     }
     let mut patient = |_: &Report| true;
-    overall.part(1.0, steps.last);
+    overall.part(1.0, steps.last * steps.light);
     let mut progress = |report: &Report| overall.take(report);
     let last: Progress = if interrupted { &mut patient } else { &mut progress };
     let refinement = finish(&mut state, interrupted, last)?;

@@ -66,7 +66,7 @@ pub fn refine(
             remedy: "a refinement starts from a stable model",
         });
     }
-    let mut overall = Overall::new(progress, 1.0, ProgressSettings::usual()?.refined);
+    let mut overall = Overall::new(progress, 1.0, 1.0, ProgressSettings::usual()?.last);
     let mut progress = |report: &Report| overall.take(report);
     let refined = joint(point, &prepared, options, f64::INFINITY, false, &mut progress)?;
     let refinement = refined.finish(&prepared, &mut progress)?;

@@ -40,11 +40,11 @@ pub fn identify(
     options: &IdentifyOptions,
     progress: Progress,
 ) -> Result<Identification, Error> {
-    let ProgressSettings { structures, identified, last, .. } = ProgressSettings::usual()?;
-    let mut overall = Overall::new(progress, identified, structures);
+    let ProgressSettings { light, structures, identified, last, .. } = ProgressSettings::usual()?;
+    let mut overall = Overall::new(progress, light, identified, structures);
     let mut prepared = prepare(record, options)?;
     let found = compare(&mut prepared, options, false, &mut |report| overall.take(report))?;
-    overall.part(1.0, last);
+    overall.part(1.0, last * light);
     let found = finish(&prepared, found, &mut |report| overall.take(report))?;
     overall.finish();
     Ok(found)
