@@ -16,7 +16,7 @@ WIDTH = 78
 START = "start["
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Parameter:
     """A parameter of a model.
 
