@@ -1,5 +1,6 @@
 """Two journeys of a new user: mistakes in a terminal that the message alone mends, and a notebook."""
 
+import json
 import re
 import textwrap
 from pathlib import Path
@@ -116,13 +117,17 @@ def test_what_a_search_proposes_can_be_typed(
     lab: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(lab)
-    options = "--half-widths 0,0.8 --thresholds 0 --order 1 --effects drift,gain-drift"
-    assert run(["explain", "run.csv", *options.split(), "--json"]) == 0
-    proposed = re.search(r'"command": "gpi (excite [^"]+)"', capsys.readouterr().out)
-    if proposed is None:
-        pytest.skip("nothing is proposed for this record")
-    assert not re.search(r"\d\.\d{6}", proposed[1]), proposed[1]
-    assert run(proposed[1].split()) == 0
+    columns = good_columns(1500)
+    t, u, y = (np.array(columns[name]) for name in ("t_s", "u_V", "y_um"))
+    # a structure that no effect may explain, and a range of 0.1 + 0.2 and the like
+    write_csv(lab / "curved.csv", {"t_s": t, "u_V": u + 0.1 + 0.2, "y_um": y + 0.1 * y**2})
+    grid = ["--half-widths", "0,0.8", "--thresholds", "0", "--order", "1", "--effects", "none"]
+    assert run(["explain", "curved.csv", *grid, "--json"]) == 0
+    proposed = json.loads(capsys.readouterr().out)["next_experiment"]["command"]
+    numbers = re.findall(r"\d[\d.]*", proposed.split("--range ")[1])
+    assert len(numbers) == 2 and all(len(one.replace(".", "").strip("0")) <= 4 for one in numbers), proposed
+    assert run(proposed.split()[1:]) == 0
+    assert (lab / "next.csv").stat().st_size > 0
 
 
 NOTEBOOK = """
