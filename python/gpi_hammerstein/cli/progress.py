@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 from rich.console import Console
 from rich.markup import escape as escape_markup
-from rich.progress import BarColumn, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
 from gpi_hammerstein._native import Progress
@@ -20,6 +20,8 @@ Tell = Callable[[Progress], None]
 
 # Seconds between two lines of the log: a search of some minutes gives a page of them.
 LOG_SECONDS = 5.0
+# Characters of a line of the bar in front of the words: bar, percent, two times, and the spaces between them.
+BESIDE = 12 + 4 + 8 + 12 + 4
 
 
 @contextmanager
@@ -39,20 +41,23 @@ def progress_bar(*, log: bool = False) -> Iterator[Tell | None]:
 def bar(errors: Console) -> Iterator[Tell]:
     """Yield a function that draws one bar for all work."""
     columns = (
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=24),
+        BarColumn(bar_width=12),
         TaskProgressColumn(),
         # the clock goes on between two reports, and stops when the fraction first is 1, which is at the end
         TimeElapsedColumn(),
-        TextColumn("{task.fields[left]}"),
+        TextColumn("{task.fields[left]:<9}"),
+        TextColumn("{task.description}"),
     )
     with Bar(*columns, console=errors, transient=True) as shown:
         task = shown.add_task("", total=1.0, left="")
 
         def tell(now: Progress) -> None:
-            left = "" if now.remaining is None else f"about {clock(now.remaining)} left"
-            shown.update(task, description=escape_markup(what(now)), completed=now.done, left=left)
+            left = "" if now.remaining is None else f"{clock(now.remaining)} left"
+            words = ", ".join(filter(None, (best(now), stage(now))))
+            # a line that is too long would take the place of the bar
+            room = max(errors.width - BESIDE, 1)
+            words = words if len(words) <= room else words[: room - 1] + "…"
+            shown.update(task, completed=now.done, left=left, description=escape_markup(words))
 
         yield tell
 
@@ -67,21 +72,20 @@ def lines() -> Tell:
             return
         last = now.elapsed
         left = "" if now.remaining is None or now.done == 1.0 else f", about {clock(now.remaining)} left"
-        stamp = time.strftime("%H:%M:%S")
-        print(
-            f"{stamp} {100 * now.done:3.0f} % {what(now)}, {clock(now.elapsed)} elapsed{left}",
-            file=sys.stderr,
-            flush=True,
-        )
+        words = ", ".join(filter(None, (stage(now), best(now), f"{clock(now.elapsed)} elapsed{left}")))
+        print(f"{time.strftime('%H:%M:%S')} {100 * now.done:3.0f} % {words}", file=sys.stderr, flush=True)
 
     return tell
 
 
-def what(now: Progress) -> str:
-    """Return the stage, what it tries, and the smallest error so far."""
-    trial = f" ({now.trial})" if now.trial else ""
-    error = "" if now.error is None else f", best error {now.error:.4g}"
-    return f"{now.stage}{trial}{error}"
+def stage(now: Progress) -> str:
+    """Return the stage and what it tries."""
+    return f"{now.stage} ({now.trial})" if now.trial else now.stage
+
+
+def best(now: Progress) -> str:
+    """Return the smallest error so far."""
+    return "" if now.error is None else f"best error {now.error:.4g}"
 
 
 def clock(seconds: float) -> str:
