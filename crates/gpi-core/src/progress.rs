@@ -40,15 +40,15 @@ settings! {
         /// The work of a stage that tries nothing, in proportion to one that does.
         light: f64 = 0.2, PART;
         /// The work of comparing structures for an identification.
-        structures: f64 = 15.0, FROM_ONE;
+        structures: f64 = 11.0, FROM_ONE;
         /// The share of this comparison in the time of an identification.
         identified: f64 = 0.95, PART;
         /// The work of comparing structures for an explanation, which compares fewer.
-        declaring: f64 = 8.0, FROM_ONE;
+        declaring: f64 = 7.0, FROM_ONE;
         /// The share of this comparison in the time of an explanation.
-        declared: f64 = 0.2, PART;
+        declared: f64 = 0.4, PART;
         /// The work of the search for effects.
-        search: f64 = 12.0, FROM_ONE;
+        search: f64 = 10.0, FROM_ONE;
         /// The share of the time of an explanation after which the search ends.
         searched: f64 = 0.9, PART;
         /// The stages of a refinement, and of what comes last: refinements and the uncertainty.
