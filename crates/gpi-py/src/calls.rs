@@ -81,8 +81,10 @@ pub(crate) fn only_a_record(
     let is_path = first.cast::<PyString>().is_ok() || first.hasattr("__fspath__")?;
     let is_file = is_path || is_table(first)?;
     let mut names = Vec::new();
-    for name in others.map(|others| others.keys()).into_iter().flatten() {
-        names.push(name.extract::<String>()?);
+    if let Some(others) = others {
+        for name in others.keys() {
+            names.push(name.extract::<String>()?);
+        }
     }
     let reads = names.iter().find(|name| OF_READING.contains(&name.as_str()));
     if let (true, Some(name)) = (is_file, reads) {
