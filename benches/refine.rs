@@ -81,7 +81,7 @@ fn record() -> Record {
 fn refinement(criterion: &mut Criterion) {
     let (record, start) = (record(), model(0.05));
     let options = RefineOptions::default();
-    let run = || refine(&start, &record, &options, &mut |_, _| true).expect("the model is stable");
+    let run = || refine(&start, &record, &options, &mut |_| true).expect("the model is stable");
     PEAK.store(NOW.load(Ordering::Relaxed), Ordering::Relaxed);
     let before = NOW.load(Ordering::Relaxed);
     let (_, how) = run();

@@ -10,12 +10,14 @@ u has the shape (samples, inputs) and y has the shape (samples, outputs). Only t
 >>> import gpi_hammerstein as gpi  # doctest: +SKIP
 >>> record = gpi.read_record("run.csv")  # doctest: +SKIP
 >>> model = gpi.identify(record)  # doctest: +SKIP
+>>> print(model.summary())  # doctest: +SKIP
 >>> y = model.simulate(record.u[0])  # doctest: +SKIP
 
 `gpi_hammerstein.plot` draws records, models and results. It is loaded when it is first used.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING as _CHECKED
+from typing import Any as _Any
 
 from gpi_hammerstein._native import (
     Compensation,
@@ -36,6 +38,7 @@ from gpi_hammerstein._native import (
     NumericalError,
     ParameterError,
     PlayBank,
+    Progress,
     Record,
     Refinement,
     StateSpace,
@@ -55,17 +58,20 @@ from gpi_hammerstein._native import (
     rivals,
     sensitivities,
 )
+from gpi_hammerstein.compared import Comparison
 from gpi_hammerstein.export import export_c, export_rust
 from gpi_hammerstein.files import load_model as load
 from gpi_hammerstein.files import save_model as save
 from gpi_hammerstein.inspection import Inspection, inspect
 from gpi_hammerstein.io import read_record
 from gpi_hammerstein.pickling import register
+from gpi_hammerstein.summary import Parameter, Summary
 
-if TYPE_CHECKING:
+if _CHECKED:
     from gpi_hammerstein import datasets, interop, plot
 
 __all__ = [
+    "Comparison",
     "Compensation",
     "Compensator",
     "DataError",
@@ -83,11 +89,14 @@ __all__ = [
     "Model",
     "NoncausalFir",
     "NumericalError",
+    "Parameter",
     "ParameterError",
     "PlayBank",
+    "Progress",
     "Record",
     "Refinement",
     "StateSpace",
+    "Summary",
     "__version__",
     "datasets",
     "decaying_triangle",
@@ -117,10 +126,15 @@ __all__ = [
 register()
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> _Any:
     """Load `plot` (and with it Matplotlib), `interop` and `datasets` when they are first used."""
     if name in ("plot", "interop", "datasets"):
         import importlib
 
         return importlib.import_module(f"gpi_hammerstein.{name}")
     raise AttributeError(f"module `gpi_hammerstein` has no attribute `{name}`")
+
+
+def __dir__() -> list[str]:
+    """Return the public names; `plot`, `interop` and `datasets` are among them before they are loaded."""
+    return sorted(__all__)

@@ -2,15 +2,20 @@
 
 from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import Any, Literal, TypeAlias, final
+from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
+from polars import DataFrame
+
+from gpi_hammerstein.compared import Comparison
+from gpi_hammerstein.summary import Parameter, Summary
 
 _Array: TypeAlias = NDArray[np.float64]
 _ComplexArray: TypeAlias = NDArray[np.complex128]
 _Reading: TypeAlias = Literal["one-sided", "directional"]
+_RecordLike: TypeAlias = Record | str | PathLike[str]
 
 __all__ = [
     "__version__",
@@ -28,6 +33,7 @@ __all__ = [
     "NoncausalFir",
     "IntermediateSignal",
     "HysteresisFit",
+    "Progress",
     "Record",
     "Model",
     "Compensation",
@@ -220,6 +226,21 @@ class HysteresisFit:
     def status(self) -> str: ...
 
 @final
+class Progress:
+    @property
+    def stage(self) -> str: ...
+    @property
+    def trial(self) -> str: ...
+    @property
+    def done(self) -> float: ...
+    @property
+    def error(self) -> float | None: ...
+    @property
+    def elapsed(self) -> float: ...
+    @property
+    def remaining(self) -> float | None: ...
+
+@final
 class Record:
     def __new__(
         cls,
@@ -243,6 +264,8 @@ class Record:
     @property
     def covariates(self) -> list[_Array]: ...
     @property
+    def time(self) -> list[_Array]: ...
+    @property
     def warmup(self) -> list[int]: ...
     @property
     def rate(self) -> float: ...
@@ -261,6 +284,11 @@ class Record:
     @property
     def covariate_units(self) -> list[str]: ...
     def split(self, fraction: float) -> tuple[Record, Record]: ...
+    def between(self, start: float, end: float) -> Record: ...
+    def to_pandas(self, experiment: int = 0) -> Any: ...
+    def to_polars(self, experiment: int = 0) -> DataFrame: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, samples: slice[Any, Any, Any], /) -> Record: ...
     def plot(self, ax: Axes | None = None) -> Axes: ...
     def _repr_html_(self) -> str: ...
 
@@ -291,16 +319,25 @@ class Model:
     @property
     def functions_of_time(self) -> list[str]: ...
     def on_another_record(
-        self, record: Record, *, fit_start: bool = True, remove_mean: bool = False
+        self, record: _RecordLike, *, fit_start: bool = True, remove_mean: bool = False
     ) -> dict[str, Any]: ...
+    def compare(
+        self, record: _RecordLike, *, fit_start: bool = True, remove_mean: bool = False
+    ) -> Comparison: ...
+    @property
+    def parameters(self) -> list[Parameter]: ...
+    def summary(self) -> Summary: ...
+    @overload
+    def simulate(self, u: Record) -> list[_Array]: ...
+    @overload
     def simulate(self, u: ArrayLike, *, covariates: ArrayLike | None = None) -> _Array: ...
     def intermediate(self, u: ArrayLike) -> _Array: ...
     def start(self, u: ArrayLike) -> _Array: ...
     def run(self, u: ArrayLike, state: ArrayLike) -> tuple[_Array, _Array]: ...
     def error(
-        self, record: Record, *, remove_mean: bool = False, fit_start: bool = False
+        self, record: _RecordLike, *, remove_mean: bool = False, fit_start: bool = False
     ) -> dict[str, float]: ...
-    def residual(self, record: Record, *, fit_start: bool = False) -> list[_Array]: ...
+    def residual(self, record: _RecordLike, *, fit_start: bool = False) -> list[_Array]: ...
     def to_json(self) -> str: ...
     @staticmethod
     def from_json(text: str) -> Model: ...
@@ -502,10 +539,10 @@ def fit_hysteresis(
     *,
     half_widths: ArrayLike | int | None = None,
     thresholds: ArrayLike | int | None = None,
-    progress: Callable[[str, float], object] | None = None,
+    progress: Callable[[Progress], object] | None = None,
 ) -> HysteresisFit: ...
 def identify(
-    record: Record,
+    record: _RecordLike,
     *,
     taps: int | None = None,
     order: int | None = None,
@@ -515,44 +552,44 @@ def identify(
     delay: int | None = None,
     robust: bool | None = None,
     offset_knots: int = 1,
-    progress: Callable[[str, float], object] | None = None,
+    progress: Callable[[Progress], object] | None = None,
 ) -> Model: ...
 def refine(
     model: Model,
-    record: Record,
+    record: _RecordLike,
     *,
     thresholds: bool = False,
     half_widths: bool = False,
     robust: bool | None = None,
     offset_knots: int = 1,
-    progress: Callable[[str, float], object] | None = None,
+    progress: Callable[[Progress], object] | None = None,
 ) -> Model: ...
 def sensitivities(
     model: Model,
-    record: Record,
+    record: _RecordLike,
     *,
     thresholds: bool = False,
     half_widths: bool = False,
     offset_knots: int = 1,
 ) -> dict[str, Any]: ...
 def explain(
-    record: Record,
-    holdout: Record | None = None,
+    record: _RecordLike,
+    holdout: _RecordLike | None = None,
     *,
-    effects: Sequence[str] | None = None,
-    require: Sequence[str] | None = None,
+    effects: str | Sequence[str] | None = None,
+    require: str | Sequence[str] | None = None,
     order: int | None = None,
     half_widths: int | ArrayLike | None = None,
     thresholds: int | ArrayLike | None = None,
     delay: int | None = None,
     reading: _Reading = "one-sided",
-    progress: Callable[[str, float], object] | None = None,
+    progress: Callable[[Progress], object] | None = None,
 ) -> Explanation: ...
 def effect_names() -> dict[str, str]: ...
-def rivals(record: Record, holdout: Record | None = None) -> list[dict[str, Any]]: ...
+def rivals(record: _RecordLike, holdout: _RecordLike | None = None) -> list[dict[str, Any]]: ...
 def signs(record: Record) -> dict[str, Any]: ...
 def residual_tests(
-    model: Model, record: Record, *, fit_start: bool = False, remove_mean: bool = False
+    model: Model, record: _RecordLike, *, fit_start: bool = False, remove_mean: bool = False
 ) -> dict[str, Any]: ...
 def time_axis(stamps: ArrayLike) -> tuple[float, float]: ...
 def multisine(

@@ -129,7 +129,7 @@ class GpiRegressor(RegressorMixin, BaseEstimator):
             Outputs, shape (samples,) or (samples, outputs), in the units of y.
         """
         check_is_fitted(self)
-        u = validate_data(self, X, reset=False, dtype=np.float64)
+        u: NDArray[np.float64] = validate_data(self, X, reset=False, dtype=np.float64)
         outputs = self.model_.simulate(u).reshape(len(u), -1)
         return outputs[:, 0] if outputs.shape[1] == 1 else outputs
 

@@ -29,6 +29,7 @@ pub struct MadeUpEffect {
 impl MadeUpEffect {
     pub(super) const NAME: &'static str = "made-up-effect";
     pub(super) const WHAT: &'static str = "the periodic error of an interferometer";
+    pub(super) const SYNONYMS: &'static [&'static str] = &["cyclic error"];
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;

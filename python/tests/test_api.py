@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
+import gpi_hammerstein as gpi
 from api_walk import WALKED, Item, items
 
 EXPORTED = [item for item in WALKED if item.kind in ("function", "class")]
@@ -121,6 +122,12 @@ def test_the_walk_reaches_everything() -> None:
     assert {"fir", "Gpi", "Gpi.run", "Gpi.__call__", "Model.rate", "Model.from_json"} <= names
     assert {"load", "plot.bode", "plot.Residuals.of", "interop.to_dlti", "datasets.fetch"} <= names
     assert {"estimator.GpiRegressor", "estimator.GpiRegressor.predict"} <= names
+
+
+def test_dir_is_the_public_api() -> None:
+    assert dir(gpi) == sorted(gpi.__all__)
+    assert {"plot", "datasets", "interop"} <= set(dir(gpi))
+    assert not {"Any", "TYPE_CHECKING", "annotations", "register"} & set(dir(gpi))
 
 
 def careless(u: ArrayLike, rate: float, extra: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -128,7 +128,8 @@ def test_simulate_refuses_what_the_model_was_not_made_for(
     slow = write_csv(tmp_path / "slow.csv", columns | {"t_s": 2 * np.asarray(columns["t_s"])})
     refuse(capsys, 3, "simulate", model, slow, words=("1000 Hz", "500 Hz", "--resample"), out=where)
     two = write_csv(tmp_path / "two.csv", {"u2_V": columns["u_V"], **columns})
-    refuse(capsys, 3, "simulate", model, two, words=("1 inputs", "has 2"), out=where)
+    both = ("--input", "u_V,u2_V")
+    refuse(capsys, 3, "simulate", model, two, *both, words=("1 inputs", "has 2"), out=where)
     milli = write_csv(tmp_path / "milli.csv", {"t_s": columns["t_s"], "u_mV": columns["u_V"]})
     refuse(capsys, 3, "simulate", model, milli, words=("`u_mV`", "in V"), out=where)
 
@@ -148,8 +149,8 @@ def test_validate_prints_and_writes_what_the_contract_says(
 @pytest.mark.parametrize(
     ("arguments", "kind"),
     [
-        (["multisine", "--band", "1", "100", "--odd", "--seed", "3"], "multisine"),
-        (["multisine", "--band", "1", "100", "--detection"], "multisine"),
+        (["multisine", "--band", "1,100", "--odd", "--seed", "3"], "multisine"),
+        (["multisine", "--band", "1,100", "--detection"], "multisine"),
         (["prbs", "--clock", "100"], "prbs"),
         (["triangle", "--frequency", "2", "--slew", "100"], "triangle"),
         (["steps", "--slew", "100"], "steps"),
@@ -159,7 +160,7 @@ def test_excite_keeps_to_rate_range_and_slew(
     arguments: list[str], kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "u.csv"
-    common = ["--rate", "1000", "--duration", "2", "--range", "-1", "9", "-o", path]
+    common = ["--rate", "1000", "--duration", "2", "--range", "-1,9", "-o", path]
     result = call(capsys, "excite", *arguments, *common)
     assert result["kind"] == kind and result["samples"] == 2000
     table = pl.read_csv(path)
@@ -176,8 +177,8 @@ def test_excite_keeps_to_rate_range_and_slew(
 
 def test_excite_refuses_parameters_out_of_range(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     where = tmp_path / "u.csv"
-    common = ["--rate", "1000", "--range", "0", "1"]
-    band = ["--band", "1", "900"]
+    common = ["--rate", "1000", "--range", "0,1"]
+    band = ["--band", "1,900"]
     refuse(capsys, 2, "excite", "multisine", *common, *band, "--duration", "1", words=("900",), out=where)
     refuse(
         capsys,
@@ -380,6 +381,55 @@ def test_help_ends_with_an_example_of_options_that_there_are(command, example, c
     assert f"Example: {example}" in said
     options = [word.split("=")[0] for word in example.split() if word.startswith("-")]
     assert all(re.search(rf"\s{option}\b", said) for option in options)
+
+
+COMMANDS = [
+    [],
+    *([command.__name__] for command in EXAMPLES),
+    *(["excite", kind] for kind in ("multisine", "prbs", "triangle", "steps")),
+    *(["datasets", one] for one in ("list", "fetch")),
+    *(["reproduce", one] for one in ("paper", "fsm")),
+]
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_a_flag_has_no_type_in_the_help(command, capsys):
+    assert run([*command, "--help"]) == 0
+    said = capsys.readouterr().out
+    assert "--help" in said and "bool" not in said.lower()
+
+
+def test_every_list_is_one_word_with_commas(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "200")
+    common = ["--rate", "100", "--duration", "1", "-o", str(tmp_path / "u.csv")]
+    for wrong in (["--range", "5", "95"], ["--range", "5;95"], ["--range", "5,9,95"]):
+        assert run(["excite", "steps", *common, *wrong]) == 2
+        assert "must be two numbers that are separated by a comma, such as -10,150" in capsys.readouterr().err
+    assert run(["excite", "steps", *common, "--range", "-5,95"]) == 0
+    assert pl.read_csv(tmp_path / "u.csv")["u_V"].min() == -5.0
+
+
+def test_the_names_of_a_model_are_looked_for_in_a_record(
+    identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = good_columns()
+    own = {"t_s": columns["t_s"], "ao_V": columns["u_V"], "ai_um": columns["y_um"]}
+    other = own | {"u_V": 0 * np.asarray(columns["u_V"]), "y_um": 0 * np.asarray(columns["y_um"])}
+    record = gpi.read_record(write_csv(tmp_path / "own.csv", own), input="ao", output="ai")
+    path = tmp_path / "own.json"
+    gpi.identify(record, half_widths=[0.0, 0.8], thresholds=0, order=1).save(path)
+    # the usual names are there too, and are those of other channels
+    result = call(capsys, "validate", path, write_csv(tmp_path / "more.csv", other))
+    assert (result["record"]["inputs"], result["record"]["outputs"]) == (["ao_V"], ["ai_um"])
+    assert result["error"]["fit_percent"] > 95
+    # options go before the names of the model, and the usual names come last
+    swapped = call(capsys, "validate", path, tmp_path / "more.csv", "-u", "u", "-y", "ai")
+    assert (swapped["record"]["inputs"], swapped["record"]["outputs"]) == (["u_V"], ["ai_um"])
+    usual = call(capsys, "validate", path, write_csv(tmp_path / "usual.csv", columns))
+    assert (usual["record"]["inputs"], usual["record"]["outputs"]) == (["u_V"], ["y_um"])
+    drive_only = write_csv(tmp_path / "u.csv", {"t_s": own["t_s"], "u_V": other["u_V"], "ao_V": own["ao_V"]})
+    simulated = call(capsys, "simulate", path, drive_only)
+    assert simulated["record"]["inputs"] == ["ao_V"] and simulated["error"] is None
 
 
 def test_without_words_it_says_how_to_begin(capsys):

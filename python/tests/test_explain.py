@@ -132,7 +132,7 @@ def test_a_required_effect_is_added_whatever_it_gains():
 
 def test_an_unknown_effect_is_refused():
     plant = plants.draw(1, (), None, SECONDS, RATE)
-    with pytest.raises(gpi.ParameterError, match="one of delay, amplifier-slew"):
+    with pytest.raises(gpi.ParameterError, match="Give one of delay, amplifier-slew"):
         gpi.explain(record_of(plant.record(0)), effects=["magic"])
 
 
@@ -140,10 +140,10 @@ def test_the_search_can_be_stopped_and_keeps_what_it_found():
     plant = plants.draw(21, ("periodic-disturbance",), 8.0, SECONDS, RATE)
     seen = []
 
-    def stop(stage, done):
-        seen.append(stage)
+    def stop(now):
+        seen.append(now.trial)
         # the score test of a second round begins when a first effect was taken
-        if "periodic-disturbance" in seen and stage == "score test":
+        if "periodic-disturbance" in seen and now.stage == "score test":
             raise KeyboardInterrupt
 
     found = gpi.explain(record_of(plant.record(0)), progress=stop, order=3)
@@ -198,7 +198,7 @@ def test_a_mode_is_kept_where_slow_poles_are_not():
 def test_an_interrupt_before_anything_is_known_is_raised():
     plant = plants.draw(1, (), None, SECONDS, RATE)
 
-    def stop(stage, done):
+    def stop(now):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

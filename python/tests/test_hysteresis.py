@@ -143,10 +143,11 @@ def test_progress_is_reported_and_can_stop_the_fit():
     u = excitation(1000)
     v, _ = oracle.gpi(u, THRESHOLDS, SLOPES, HALF_WIDTHS, WEIGHTS)
     seen = []
-    gpi.fit_hysteresis(u, v, progress=lambda stage, done: seen.append((stage, done)))
-    assert seen and all(isinstance(stage, str) and 0 <= done <= 1 for stage, done in seen)
+    gpi.fit_hysteresis(u, v, progress=seen.append)
+    assert {now.stage for now in seen} == {"hysteresis", "done"}
+    assert all(0 <= now.done <= 1 for now in seen) and seen[-1].done == 1.0
 
-    def stop(stage, done):
+    def stop(now):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

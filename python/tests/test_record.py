@@ -231,3 +231,67 @@ def test_time_axis_refuses(stamps, words):
         time_axis(stamps)
     for word in words:
         assert word in str(caught.value)
+
+
+# --- a record is a sequence of samples -----------------------------------------------------------
+
+
+def two_experiments():
+    return gpi.Record(
+        [ramp(10), 100 + ramp(6)],
+        [-ramp(10), ramp(6)],
+        4.0,
+        covariates=[ramp(10, 2), ramp(6, 2)],
+        warmup=[3, 0],
+        input_units=["V"],
+    )
+
+
+def test_length_and_time_count_samples():
+    record = two_experiments()
+    assert len(record) == record.samples == 16
+    assert [len(time) for time in record.time] == [10, 6]
+    np.testing.assert_array_equal(record.time[0], np.arange(10) / 4.0)
+
+
+def test_a_slice_counts_through_the_experiments():
+    record = two_experiments()
+    part = record[5:12]
+    np.testing.assert_array_equal(np.concatenate(part.u)[:, 0], [5, 6, 7, 8, 9, 100, 101])
+    np.testing.assert_array_equal(part.covariates[0], ramp(10, 2)[5:])
+    assert (part.warmup, part.rate, part.input_units) == ([0, 0], 4.0, ["V"])
+    assert record[1:].warmup == [2, 0] and len(record[:]) == 16
+    np.testing.assert_array_equal(record[-2:].u[0][:, 0], [104, 105])
+
+
+def test_a_slice_of_time_counts_from_the_start_of_each_experiment():
+    part = two_experiments().between(1.0, 2.0)
+    np.testing.assert_array_equal(part.u[0][:, 0], [4, 5, 6, 7])
+    np.testing.assert_array_equal(part.u[1][:, 0], [104, 105])
+    # a time that rounding has moved is that of the same sample
+    record = gpi.Record(ramp(1000), ramp(1000), 1e3)
+    for k in range(0, 990, 7):
+        assert record.between(k / 1e3, (k + 3) / 1e3).u[0][:, 0].tolist() == [k, k + 1, k + 2]
+
+
+@pytest.mark.parametrize(
+    ("part", "error", "words"),
+    [
+        (lambda r: r[::2], gpi.ParameterError, "step of the slice is 2"),
+        (lambda r: r[3], TypeError, r"record\[100:200\].*record.between"),
+        (lambda r: r[0:3], gpi.ParameterError, "no scored sample; the record has 16 samples"),
+        (lambda r: r[20:30], gpi.ParameterError, "no scored sample"),
+        (lambda r: r.between(3.0, 4.0), gpi.ParameterError, "the longest of 2.5 s"),
+        (lambda r: r.between(0.0, np.inf), gpi.ParameterError, "`end` = inf"),
+    ],
+)
+def test_parts_without_samples_are_refused(part, error, words):
+    with pytest.raises(error, match=words):
+        part(two_experiments())
+
+
+def test_an_experiment_is_a_frame():
+    record = two_experiments()
+    for frame in (record.to_pandas(1), record.to_polars(1)):
+        assert list(frame.columns) == ["t [s]", "u [V]", "y", "x1", "x2"]
+        assert list(frame["u [V]"]) == [100, 101, 102, 103, 104, 105]

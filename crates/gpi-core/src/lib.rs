@@ -67,7 +67,7 @@ pub use estimates::{EffectEstimates, Estimate, EstimatedNoise, Estimates};
 #[cfg(feature = "identify")]
 pub use model::{Hysteresis, Model, ModelState};
 #[cfg(feature = "identify")]
-pub use progress::Progress;
+pub use progress::{Progress, Report};
 #[cfg(feature = "identify")]
 pub use record::{Channel, Experiment, Record, TimeAxis};
 #[cfg(feature = "identify")]

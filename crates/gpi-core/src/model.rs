@@ -302,10 +302,20 @@ impl Model {
     pub fn residuals(&self, record: &Record) -> Result<Vec<Matrix>, Error> {
         let outputs = ("record's outputs", record.outputs().len());
         Error::require_equal("outputs", outputs, ("model's outputs", self.outputs.len()))?;
+        let simulated = self.simulate_record(record)?;
+        let experiments = record.experiments().iter().zip(simulated);
+        Ok(experiments.map(|(experiment, output)| &experiment.output - output).collect())
+    }
+
+    /// The outputs of every experiment of a record, (samples, outputs), each from the steady state at its first input and
+    /// with the record's other measured columns, see [`Model::simulate_beside`].
+    ///
+    /// # Errors
+    /// Another number of inputs than the model's; a measured column that an effect needs is not in the record.
+    pub fn simulate_record(&self, record: &Record) -> Result<Vec<Matrix>, Error> {
         self.require_covariates_of(record)?;
-        let residual =
-            |e: &crate::Experiment| Ok(&e.output - self.simulate_beside(&e.input, &e.covariates)?);
-        record.experiments().iter().map(residual).collect()
+        let simulated = |e: &crate::Experiment| self.simulate_beside(&e.input, &e.covariates);
+        record.experiments().iter().map(simulated).collect()
     }
 
     /// The simulation error over the scored samples of a record; `remove_mean` takes the mean of

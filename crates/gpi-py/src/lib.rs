@@ -2,6 +2,7 @@
 //! or folder a core module.
 
 mod arrays;
+mod calls;
 mod channels;
 mod compensate;
 mod errors;
@@ -26,6 +27,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     operators::register(module)?;
     linear::register(module)?;
+    progress::register(module)?;
     record::register(module)?;
     model::register(module)?;
     compensate::register(module)?;

@@ -1,11 +1,13 @@
 //! Measured records.
 
-use crate::arrays::{experiments, from_matrix, vector};
+use crate::arrays::{experiments, from_matrix, from_owned, vector};
 use crate::channels::{Label, channels, label, names, units};
 use crate::errors::{parameter, to_python};
 use crate::plotting::{in_notebook, plot};
 use gpi_core::{Experiment, Matrix, TimeAxis};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::PySlice;
 
 /// Measured experiments with one actuator at one sampling rate.
 ///
@@ -38,6 +40,12 @@ use pyo3::prelude::*;
 /// >>> u = np.sin(np.arange(100.0))
 /// >>> gpi.Record(u, 2 * u, rate=1000.0, input_units=["V"], output_units=["um"])
 /// Record(100 samples at 1000 Hz, u [V] -> y [um])
+///
+/// A record is a sequence of samples. A slice is a part of it:
+///
+/// >>> record = gpi.Record(u, 2 * u, rate=1000.0)
+/// >>> len(record), record[20:50], record.time[0][-1].item()
+/// (100, Record(30 samples at 1000 Hz, u -> y), 0.099)
 #[pyclass(module = "gpi_hammerstein", frozen)]
 pub(crate) struct Record {
     pub(crate) record: gpi_core::Record,
@@ -123,6 +131,14 @@ impl Record {
         self.record.experiments().iter().map(|e| from_matrix(py, &e.covariates)).collect()
     }
 
+    /// Time of the samples of each experiment, each of shape (samples,), in s; 0 is the first sample of the experiment.
+    #[getter]
+    fn time<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyAny>> {
+        let rate = self.record.rate();
+        let time = |rows: usize| (0..rows).map(|k| k as f64 / rate).collect();
+        self.record.experiments().iter().map(|e| from_owned(py, time(e.input.nrows()))).collect()
+    }
+
     /// Number of samples at the start of each experiment that are not scored.
     #[getter]
     fn warmup(&self) -> Vec<usize> {
@@ -192,6 +208,89 @@ impl Record {
     fn split(&self, fraction: f64) -> PyResult<(Self, Self)> {
         let (first, rest) = self.record.split(fraction).map_err(to_python)?;
         Ok((Self { record: first }, Self { record: rest }))
+    }
+
+    /// The part between two times.
+    ///
+    /// Parameters
+    /// ----------
+    /// start, end : float
+    ///     Times in seconds, counted from the first sample of each experiment. The sample at ``end`` is not included.
+    ///
+    /// Returns
+    /// -------
+    /// Record
+    ///     The samples of every experiment between the two times. What is left of a warm-up stays one. The state at the start of
+    ///     a part is unknown; ``split`` keeps what went before as warm-up.
+    ///
+    /// Raises
+    /// ------
+    /// ParameterError
+    ///     There is no scored sample between the times.
+    ///
+    /// Examples
+    /// --------
+    /// >>> record = gpi.Record(np.arange(100.0), np.arange(100.0), rate=10.0)
+    /// >>> record.between(2.0, 5.0)
+    /// Record(30 samples at 10 Hz, u -> y)
+    fn between(&self, start: f64, end: f64) -> PyResult<Self> {
+        self.record.between(start, end).map(|record| Self { record }).map_err(to_python)
+    }
+
+    /// Converts an experiment to a pandas data frame; see ``gpi_hammerstein.interop.to_pandas``.
+    ///
+    /// Parameters
+    /// ----------
+    /// experiment : int
+    ///     The number of the experiment, counted from 0.
+    ///
+    /// Returns
+    /// -------
+    /// pandas.DataFrame
+    ///     ``t [s]`` and the channels, with their units in brackets.
+    #[pyo3(signature = (experiment = 0))]
+    fn to_pandas<'py>(slf: &Bound<'py, Self>, experiment: usize) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("gpi_hammerstein.interop")?.call_method1("to_pandas", (slf, experiment))
+    }
+
+    /// Converts an experiment to a Polars data frame; see ``gpi_hammerstein.interop.to_polars``.
+    ///
+    /// Parameters
+    /// ----------
+    /// experiment : int
+    ///     The number of the experiment, counted from 0.
+    ///
+    /// Returns
+    /// -------
+    /// polars.DataFrame
+    ///     ``t [s]`` and the channels, with their units in brackets.
+    #[pyo3(signature = (experiment = 0))]
+    fn to_polars<'py>(slf: &Bound<'py, Self>, experiment: usize) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("gpi_hammerstein.interop")?.call_method1("to_polars", (slf, experiment))
+    }
+
+    fn __len__(&self) -> usize {
+        self.record.samples()
+    }
+
+    fn __getitem__(&self, samples: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let Ok(slice) = samples.cast::<PySlice>() else {
+            return Err(PyTypeError::new_err(
+                "a part of a record is a slice of samples, such as record[100:200], or of time, record.between(0.1, 0.2)",
+            ));
+        };
+        let length = isize::try_from(self.record.samples()).unwrap_or(isize::MAX);
+        let found = slice.indices(length)?;
+        if found.step != 1 {
+            return Err(parameter(format!(
+                "the step of the slice is {}, but must be 1: a record has one rate; filter it and make a new one for \
+                 another rate",
+                found.step
+            )));
+        }
+        let place = |index: isize| usize::try_from(index).unwrap_or(0);
+        let part = self.record.slice(place(found.start)..place(found.stop));
+        part.map(|record| Self { record }).map_err(to_python)
     }
 
     /// Draws inputs and outputs over time; see ``gpi_hammerstein.plot.record``.

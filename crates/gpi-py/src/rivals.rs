@@ -1,6 +1,6 @@
 //! Simple models of a record.
 
-use crate::record::Record;
+use crate::calls;
 use gpi_core::rivals::{self as core, Rival};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -22,9 +22,9 @@ use pyo3::types::PyDict;
 ///
 /// Parameters
 /// ----------
-/// record : Record
+/// record : Record or path
 ///     Training data, u of shape (samples, inputs) and y of shape (samples, outputs). Its scored samples are used.
-/// holdout : Record, optional
+/// holdout : Record or path, optional
 ///     Held-out data. When left out, ten blocks of time of each experiment of ``record`` are held out, as in ``explain``.
 ///
 /// Returns
@@ -50,10 +50,13 @@ use pyo3::types::PyDict;
 #[pyo3(signature = (record, holdout = None))]
 fn rivals<'py>(
     py: Python<'py>,
-    record: &Record,
-    holdout: Option<&Record>,
+    record: &Bound<'py, PyAny>,
+    holdout: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Vec<Bound<'py, PyDict>>> {
-    let (record, holdout) = (&record.record, holdout.map(|other| &other.record));
+    let record = calls::record("record", record, "gpi.rivals(")?;
+    let holdout = calls::optional_record("holdout", holdout, "gpi.rivals(record, ")?;
+    let (record, holdout) =
+        (&record.get().record, holdout.as_ref().map(|other| &other.get().record));
     let found = py.detach(|| match holdout {
         Some(other) => core::rivals(record, Some(other)),
         None => core::rivals(&gpi_core::explain::hold_out(record)?, None),

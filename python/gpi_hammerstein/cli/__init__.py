@@ -15,6 +15,7 @@ from gpi_hammerstein.cli.demo import demo
 from gpi_hammerstein.cli.excite import excite
 from gpi_hammerstein.cli.explain import explain
 from gpi_hammerstein.cli.export import export
+from gpi_hammerstein.cli.help import Command, Group
 from gpi_hammerstein.cli.identify import identify
 from gpi_hammerstein.cli.inspect import inspect
 from gpi_hammerstein.cli.output import complain
@@ -27,6 +28,7 @@ DONE, FAILED, WRONG_CALL, UNUSABLE_DATA, INTERRUPTED = 0, 1, 2, 3, 130
 
 app: typer.Typer = typer.Typer(
     name="gpi",
+    cls=Group,
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -60,11 +62,11 @@ EXAMPLES: dict[Callable[..., Any], str] = {
     report: "gpi report run.csv",
     simulate: "gpi simulate model/model.json drive.csv -o prediction",
     validate: "gpi validate model/model.json other.csv -o check",
-    compensate: "gpi compensate model/model.json path.csv --limits=-10,150 -o drive",
-    export: "gpi export model/model.json --limits=-10,150 --c compensator",
+    compensate: "gpi compensate model/model.json path.csv --limits -10,150 -o drive",
+    export: "gpi export model/model.json --limits -10,150 --c compensator",
 }
 for _command, _example in EXAMPLES.items():
-    app.command(epilog=f"Example: {_example}")(_command)
+    app.command(cls=Command, epilog=f"Example: {_example}")(_command)
 app.add_typer(excite, name="excite")
 app.add_typer(datasets, name="datasets")
 app.add_typer(reproduce, name="reproduce")

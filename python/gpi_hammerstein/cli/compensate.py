@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from gpi_hammerstein import files
-from gpi_hammerstein._native import Compensation, DataError, Model, ParameterError
+from gpi_hammerstein._native import Compensation, DataError, Model
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import (
     console,
@@ -38,9 +38,10 @@ Columns = Annotated[
     ),
 ]
 Limits = Annotated[
-    list[str] | None,
+    list[options.Pair] | None,
     typer.Option(
         "--limits",
+        parser=options.read_pair,
         metavar="LOW,HIGH",
         help="Lowest and highest drive, in the unit of the input; once for all inputs, or once for each.",
     ),
@@ -99,7 +100,7 @@ def compensate(
     drive.csv (t, the inputs, the reference and the predicted outputs), compensation.json and a picture to
     DIR.
     """
-    model = files.load_model(model_file)
+    model = options.load_model(model_file, "REFERENCE")
     recording = read_reference(reference_file, model, options.split_names(reference), time, rate, resample)
     if len(recording.runs) > 1:
         count = len(recording.runs)
@@ -109,7 +110,7 @@ def compensate(
     with working("compensating"):
         found = model.compensate(
             recording.runs[0].u,
-            limits=[read_pair(pair) for pair in limits] if limits else None,
+            limits=limits or None,
             slew=slew,
             quasi_static=quasi_static,
             preview=None if preview is None else round(preview * model.rate),
@@ -264,17 +265,6 @@ def matching(recording: Recording, model: Model) -> Recording:
                 f"the model's output is in {unit}, but column `{column.header}` is in {column.unit}"
             )
     return recording
-
-
-def read_pair(text: str) -> tuple[float, float]:
-    """Parse two numbers that are separated by a comma."""
-    try:
-        low, high = (float(part) for part in text.split(","))
-    except ValueError:
-        raise ParameterError(
-            f"`limits` = {text}: must be the lowest and the highest drive, such as -10,150"
-        ) from None
-    return low, high
 
 
 def columns(signal: np.ndarray) -> np.ndarray:

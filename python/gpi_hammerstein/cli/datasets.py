@@ -8,11 +8,12 @@ from rich.table import Table
 
 from gpi_hammerstein import files
 from gpi_hammerstein.cli import options
+from gpi_hammerstein.cli.help import Command, Group
 from gpi_hammerstein.cli.output import console, escape, print_json, working
 from gpi_hammerstein.escaping import in_cell
 
 datasets: typer.Typer = typer.Typer(
-    no_args_is_help=True, help="List and download measured records that anybody may use."
+    cls=Group, no_args_is_help=True, help="List and download measured records that anybody may use."
 )
 
 Name = Annotated[
@@ -28,7 +29,7 @@ Out = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
-@datasets.command("list", epilog="Example: gpi datasets list")
+@datasets.command("list", cls=Command, epilog="Example: gpi datasets list")
 def list_all(as_json: Json = False) -> None:
     """List the sets with their parts, licences and web pages."""
     from gpi_hammerstein.datasets import CATALOGUE
@@ -56,7 +57,7 @@ def list_all(as_json: Json = False) -> None:
     console().print(table)
 
 
-@datasets.command(epilog="Example: gpi datasets fetch piezo-p885-dbo -o data")
+@datasets.command(cls=Command, epilog="Example: gpi datasets fetch piezo-p885-dbo -o data")
 def fetch(name: Name, part: Part = None, out: Out = Path(".")) -> None:
     """Download a part of a set, and write a CSV file for each experiment. All commands read these files."""
     from gpi_hammerstein.datasets import chosen, load

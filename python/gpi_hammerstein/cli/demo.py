@@ -17,10 +17,10 @@ from gpi_hammerstein.cli.output import (
     console,
     escape,
     print_json,
-    progress_bar,
     say_written,
     stoppable,
 )
+from gpi_hammerstein.cli.progress import progress_bar
 from gpi_hammerstein.cli.validate import residual_figures
 from gpi_hammerstein.explanation import in_words, join, to_dict
 from gpi_hammerstein.held_out import rule_of
@@ -30,7 +30,7 @@ DATA = files("gpi_hammerstein") / "data"
 RECORD, TRUTH = "demo.csv.gz", "demo.truth.json"
 
 
-def demo(out: options.Out = None, as_json: options.Json = False) -> None:
+def demo(out: options.Out = None, log: options.Log = False, as_json: options.Json = False) -> None:
     """Run the complete workflow on a bundled record: identify, find missing effects, compare the errors.
 
     The record is from a simulated piezo stage with effects that the declared model does not contain. Writes
@@ -39,7 +39,7 @@ def demo(out: options.Out = None, as_json: options.Json = False) -> None:
     with as_file(DATA / RECORD) as path:
         record = read_record(path)
     truth = json.loads((DATA / TRUTH).read_text(encoding="utf-8"))
-    with progress_bar() as progress, stoppable():
+    with progress_bar(log=log) as progress, stoppable():
         found = native.explain(record, progress=progress)
     result: dict[str, Any] = {
         "schema": "gpi-demo/1",

@@ -12,17 +12,25 @@ from numpy.typing import NDArray
 import gpi_hammerstein._native as native
 from gpi_hammerstein._native import ParameterError
 from gpi_hammerstein.cli import options
+from gpi_hammerstein.cli.help import Command, Group
 from gpi_hammerstein.cli.output import console, print_json
 from gpi_hammerstein.files import write_atomically
 
 excite: typer.Typer = typer.Typer(
-    no_args_is_help=True, help="Write an excitation signal: multisine, prbs, triangle or steps."
+    cls=Group, no_args_is_help=True, help="Write an excitation signal: multisine, prbs, triangle or steps."
 )
 
 Rate = Annotated[float, typer.Option(help="Sampling rate in Hz.", show_default=False)]
 Duration = Annotated[float, typer.Option(help="Duration in s.", show_default=False)]
 Range = Annotated[
-    tuple[float, float], typer.Option("--range", help="Smallest and largest value.", metavar="LOW HIGH")
+    options.Pair,
+    typer.Option(
+        "--range",
+        parser=options.read_pair,
+        help="Smallest and largest value.",
+        metavar="LOW,HIGH",
+        show_default=False,
+    ),
 ]
 Slew = Annotated[float | None, typer.Option(help="Largest slope, in units per second.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")]
@@ -33,12 +41,18 @@ Out = Annotated[
 ]
 
 
-@excite.command()
+@excite.command(cls=Command)
 def multisine(
     rate: Rate,
     duration: Duration,
     band: Annotated[
-        tuple[float, float], typer.Option(help="Lowest and highest frequency in Hz.", metavar="LOW HIGH")
+        options.Pair,
+        typer.Option(
+            parser=options.read_pair,
+            help="Lowest and highest frequency in Hz.",
+            metavar="LOW,HIGH",
+            show_default=False,
+        ),
     ],
     range_: Range,
     out: Out,
@@ -62,7 +76,7 @@ def multisine(
     finish(u, kind, rate, unit, out, as_json)
 
 
-@excite.command()
+@excite.command(cls=Command)
 def prbs(
     rate: Rate,
     duration: Duration,
@@ -81,7 +95,7 @@ def prbs(
     finish(u, {"kind": "prbs", "clock_hz": clock, "seed": seed}, rate, unit, out, as_json)
 
 
-@excite.command()
+@excite.command(cls=Command)
 def triangle(
     rate: Rate,
     duration: Duration,
@@ -97,7 +111,7 @@ def triangle(
     finish(u, {"kind": "triangle", "frequency_hz": frequency}, rate, unit, out, as_json)
 
 
-@excite.command()
+@excite.command(cls=Command)
 def steps(
     rate: Rate,
     duration: Duration,

@@ -20,13 +20,13 @@ from gpi_hammerstein.cli.output import (
     escape,
     picture,
     print_json,
-    progress_bar,
     rival_table,
     say_written,
     stoppable,
     working,
     write_json,
 )
+from gpi_hammerstein.cli.progress import progress_bar
 from gpi_hammerstein.cli.residual import name_pictures, write_residual_pictures
 from gpi_hammerstein.explanation import in_words, to_dict
 from gpi_hammerstein.held_out import rule_of
@@ -99,6 +99,7 @@ def explain(
     report: Annotated[
         bool, typer.Option("--report", help="Also write report.html, one page with all results, to DIR.")
     ] = False,
+    log: options.Log = False,
     as_json: options.Json = False,
 ) -> int:
     """Find the effects that a model lacks, add them, and compare the error before and after.
@@ -123,6 +124,7 @@ def explain(
         read,
         experiments,
         holdout_record,
+        log=log,
         effects=split_effects(effects),
         require=split_effects(require),
         order=order,
@@ -150,6 +152,8 @@ def explained(
     read: dict[str, Any],
     experiments: str | None,
     holdout_record: Path | None,
+    *,
+    log: bool = False,
     **choices: Any,
 ) -> tuple[Recording, Explanation, str]:
     """Read records and explain them. Return also a description of the test data."""
@@ -157,7 +161,7 @@ def explained(
     if holdout_record is not None and holdout_record.suffix == ".npy":
         raise ParameterError(f"`holdout-record` = {holdout_record}: a .npy file contains no output; use .npz")
     other = None if holdout_record is None else options.read([holdout_record], **read).record()
-    with progress_bar() as progress, stoppable():
+    with progress_bar(log=log) as progress, stoppable():
         found = native.explain(recording.record(), other, progress=progress, **choices)
     where = (
         "blocks of time that are distributed over the record"

@@ -8,7 +8,6 @@ import typer
 from gpi_hammerstein import files
 from gpi_hammerstein._native import ParameterError
 from gpi_hammerstein.cli import options
-from gpi_hammerstein.cli.compensate import read_pair
 from gpi_hammerstein.cli.output import console, escape
 from gpi_hammerstein.cli.simulate import ModelFile
 from gpi_hammerstein.export import export_c, export_rust
@@ -28,7 +27,12 @@ C = Annotated[
     ),
 ]
 Limits = Annotated[
-    str | None, typer.Option(metavar="LOW,HIGH", help="Lowest and highest drive, in the unit of the input.")
+    options.Pair | None,
+    typer.Option(
+        parser=options.read_pair,
+        metavar="LOW,HIGH",
+        help="Lowest and highest drive, in the unit of the input.",
+    ),
 ]
 PrecisionOption = Annotated[
     Literal["single", "double"], typer.Option(help="Number type: float and f32, or double and f64.")
@@ -54,13 +58,12 @@ def export(
             "nothing to write: name a file (--rust compensator.rs) or a folder (--c compensator)"
         )
     model = files.load_model(model_file)
-    pair = None if limits is None else read_pair(limits)
     written = []
     if rust is not None:
-        compensator = export_rust(model, rust, limits=pair, precision=precision)
+        compensator = export_rust(model, rust, limits=limits, precision=precision)
         written.append(rust)
     if c is not None:
-        compensator = export_c(model, c, limits=pair, precision=precision, name=name)
+        compensator = export_c(model, c, limits=limits, precision=precision, name=name)
         written += [c / f"{name}.h", c / f"{name}.c"]
     screen = console()
     screen.print(f"Compensated: {', '.join(compensator.compensated)}.")

@@ -16,10 +16,10 @@ from gpi_hammerstein.cli.output import (
     console,
     describe_record,
     print_json,
-    progress_bar,
     working,
     write_json,
 )
+from gpi_hammerstein.cli.progress import progress_bar
 from gpi_hammerstein.held_out import rule_in_words
 from gpi_hammerstein.io import Recording, raise_warmup
 
@@ -104,6 +104,7 @@ def identify(
     fit_start: options.FitStart = True,
     remove_mean: options.RemoveMean = False,
     out: options.Out = None,
+    log: options.Log = False,
     as_json: options.Json = False,
 ) -> None:
     """Identify hysteresis and linear dynamics from a record, and test the model on held-out data.
@@ -122,7 +123,7 @@ def identify(
     chosen = experiments if holdout_experiments is None else None
     recording = options.read(records, **read, experiments=chosen)
     train, test, how = hold_out(recording, read, experiments, holdout_record, holdout_experiments, holdout)
-    with progress_bar() as progress:
+    with progress_bar(log=log) as progress:
         model = native.identify(
             train,
             taps=taps,

@@ -1,15 +1,35 @@
 """Options that several commands share, and the functions that parse them."""
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
-from gpi_hammerstein._native import ParameterError
+from gpi_hammerstein import files
+from gpi_hammerstein._native import DataError, Model, ParameterError
 from gpi_hammerstein.files import require_file, require_folder
 from gpi_hammerstein.io import Recording, read_recording
 
 COLUMNS = "Columns"
+
+
+class Pair(NamedTuple):
+    """Two numbers, the lower one first."""
+
+    low: float
+    high: float
+
+
+def read_pair(text: str) -> Pair:
+    """Parse two numbers that are separated by a comma, as all lists on the command line."""
+    try:
+        low, high = (float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter(
+            f"`{text}` must be two numbers that are separated by a comma, such as -10,150"
+        ) from None
+    return Pair(low, high)
 
 
 def writable_folder(context: typer.Context, out: Path | None) -> Path | None:
@@ -39,6 +59,7 @@ Input = Annotated[
     typer.Option(
         "--input",
         "-u",
+        metavar="NAME,..",
         help="Input columns. Names such as `u`, `u1`, `voltage` are recognised.",
         rich_help_panel=COLUMNS,
     ),
@@ -48,6 +69,7 @@ Output = Annotated[
     typer.Option(
         "--output",
         "-y",
+        metavar="NAME,..",
         help="Output columns. Names such as `y`, `y1`, `position` are recognised. For .npy records, give the "
         ".npy files of the outputs.",
         rich_help_panel=COLUMNS,
@@ -55,16 +77,24 @@ Output = Annotated[
 ]
 Time = Annotated[
     str | None,
-    typer.Option("--time", help="Time column. `t` and `time` are recognised.", rich_help_panel=COLUMNS),
+    typer.Option(
+        "--time", metavar="NAME", help="Time column. `t` and `time` are recognised.", rich_help_panel=COLUMNS
+    ),
 ]
 Rate = Annotated[
     float | None,
-    typer.Option("--rate", help="Sampling rate in Hz, instead of a time column.", rich_help_panel=COLUMNS),
+    typer.Option(
+        "--rate",
+        metavar="HZ",
+        help="Sampling rate in Hz, for a record without a time column.",
+        rich_help_panel=COLUMNS,
+    ),
 ]
 Covariate = Annotated[
     list[str] | None,
     typer.Option(
         "--covariate",
+        metavar="NAME,..",
         help="Other measured columns. Default: all other columns. `none` ignores them.",
         rich_help_panel=COLUMNS,
     ),
@@ -112,11 +142,15 @@ Out = Annotated[
         callback=writable_folder,
     ),
 ]
+Log = Annotated[
+    bool,
+    typer.Option("--log", help="Show the progress as lines on stderr, also where it is no terminal."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
 
 
 def read(
-    files: list[Path],
+    records: list[Path],
     *,
     input: list[str] | None,
     output: list[str] | None,
@@ -126,19 +160,60 @@ def read(
     resample: str | None,
     warmup: int | None,
     experiments: str | None = None,
+    model: Model | None = None,
 ) -> Recording:
-    """Read a record according to the options."""
-    return read_recording(
-        list(files),
-        input=split_names(input),
-        output=split_names(output),
-        time=time,
-        rate=rate,
-        covariate=[] if covariate == ["none"] else split_names(covariate),
-        warmup=warmup,
-        resample=parse_resample(resample),
-        experiment=experiments,
-    )
+    """Read a record according to the options.
+
+    Columns that have the names of the channels of `model` are taken as these channels, unless the options
+    name others.
+    """
+    inputs, outputs = split_names(input), split_names(output)
+    for own_inputs, own_outputs in named_by(model, records, inputs, outputs):
+        try:
+            return read_recording(
+                list(records),
+                input=own_inputs,
+                output=own_outputs,
+                time=time,
+                rate=rate,
+                covariate=[] if covariate == ["none"] else split_names(covariate),
+                warmup=warmup,
+                resample=parse_resample(resample),
+                experiment=experiments,
+            )
+        except DataError as error:
+            # the file has other names than the model: the usual ones are tried next
+            is_last = (own_inputs, own_outputs) == (inputs, outputs)
+            if is_last or "no column `" not in str(error):
+                raise
+    raise AssertionError("the last names are those of the options")
+
+
+Names = list[str] | None
+
+
+def named_by(
+    model: Model | None, records: list[Path], inputs: Names, outputs: Names
+) -> Iterator[tuple[Names, Names]]:
+    """Yield the names of inputs and outputs to look for: those of the model first."""
+    # the outputs of a .npy file are other files
+    if model is not None and not any(file.suffix == ".npy" for file in records):
+        own_inputs = model.input_names if inputs is None else inputs
+        own_outputs = model.output_names if outputs is None else outputs
+        for pair in ((own_inputs, own_outputs), (own_inputs, outputs), (inputs, own_outputs)):
+            if pair != (inputs, outputs):
+                yield pair
+    yield inputs, outputs
+
+
+def load_model(file: Path, then: str = "RECORD") -> Model:
+    """Read a model; a file that is no model may have changed places with the other argument, `then`."""
+    try:
+        return files.load_model(file)
+    except DataError as error:
+        if file.suffix == ".json":
+            raise
+        raise DataError(f"{error}; the model file comes first: MODEL {then}") from error
 
 
 def split_names(names: list[str] | None) -> list[str] | None:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.console import Console
 from rich.markup import escape as escape_markup
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from gpi_hammerstein._native import GpiError, Record
@@ -84,24 +83,6 @@ def working(what: str) -> Iterator[None]:
     errors = Console(stderr=True)
     with errors.status(what) if errors.is_terminal else nullcontext():
         yield
-
-
-@contextmanager
-def progress_bar() -> Iterator[Callable[[str, float], None] | None]:
-    """Yield a function that draws a progress bar on stderr; None if stderr is not a terminal."""
-    errors = Console(stderr=True)
-    if not errors.is_terminal:
-        yield None
-        return
-    # the number of phases is not known beforehand: show the elapsed time, not the remaining time
-    columns = (TextColumn("{task.description}"), SpinnerColumn(), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=errors, transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-
-        def report(phase: str, done: float) -> None:
-            bar.update(task, description=phase, completed=done)
-
-        yield report
 
 
 @contextmanager

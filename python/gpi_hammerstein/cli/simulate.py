@@ -59,7 +59,7 @@ def simulate(
     Writes simulated.csv to DIR. Its columns are t and y, or t, y1, y2, ..; for several experiments, the first
     column is `experiment`.
     """
-    model = files.load_model(model_file)
+    model = options.load_model(model_file)
     recording = options.read(
         records,
         input=input,
@@ -70,6 +70,7 @@ def simulate(
         resample=resample,
         warmup=warmup,
         experiments=experiments,
+        model=model,
     ).skip(skip)
     require_match(model, recording)
     record = recording.record() if recording.outputs else None

@@ -63,7 +63,7 @@ def validate(
     (drift, disturbances) are left out. Accepts any gpi-model/1 file. Writes validation.json and pictures of
     the residual to DIR.
     """
-    model = files.load_model(model_file)
+    model = options.load_model(model_file)
     recording = options.read(
         records,
         input=input,
@@ -74,6 +74,7 @@ def validate(
         resample=resample,
         warmup=warmup,
         experiments=experiments,
+        model=model,
     ).skip(skip)
     require_match(model, recording)
     record = recording.record()
@@ -86,7 +87,8 @@ def validate(
             error, model = found["error"], found["model"]
         residual = residual_tests(model, record, remove_mean=remove_mean, fit_start=fit_start)
         figures = residual_figures(model, record, fit_start=fit_start)
-    name_pictures(residual["tests"], record.output_names, drawn=out is not None)
+    # tests name the channels of the model, which the record may call otherwise
+    name_pictures(residual["tests"], model.output_names, drawn=out is not None)
     rule = rule_in_words(fit_start=fit_start, remove_mean=remove_mean, left_out=left_out)
     result: dict[str, Any] = {
         "schema": "gpi-validation/1",

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gpi_hammerstein._native import Explanation, Model, ParameterError, Record, explain
+from gpi_hammerstein._native import Explanation, Model, ParameterError, Progress, Record, explain
 from gpi_hammerstein.reproduce.benchmark_data import fetch, local_folder
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ def steering_mirror(
     fitted: Sequence[int] = LEVELS,
     order: int = ORDER,
     realisations: int = HELD_OUT,
-    progress: Callable[[str, float], object] | None = None,
+    progress: Callable[[Progress], object] | None = None,
 ) -> SteeringMirror:
     """Explain the records of all amplitudes together, and test on a held-out realisation.
 

@@ -19,6 +19,15 @@ pub struct AmplifierSlew {
 impl AmplifierSlew {
     pub(super) const NAME: &'static str = "amplifier-slew";
     pub(super) const WHAT: &'static str = "the drive cannot change faster than a limit";
+    pub(super) const SYNONYMS: &'static [&'static str] = &[
+        "slew",
+        "slew rate",
+        "slew-rate",
+        "slew limit",
+        "amplifier",
+        "current limit",
+        "rate limit",
+    ];
     pub(super) const STAGE: Stage = Stage::Input;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;

@@ -20,6 +20,8 @@ pub struct Backlash {
 impl Backlash {
     pub(super) const NAME: &'static str = "backlash";
     pub(super) const WHAT: &'static str = "mechanical play after the dynamics";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["gap", "dead play", "lost motion", "free play", "clearance"];
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;

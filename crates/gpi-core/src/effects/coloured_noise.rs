@@ -23,6 +23,8 @@ pub struct ColouredNoise {
 impl ColouredNoise {
     pub(super) const NAME: &'static str = "coloured-noise";
     pub(super) const WHAT: &'static str = "the noise has memory";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["colored-noise", "coloured noise", "noise", "autocorrelated noise", "autocorrelation"];
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = false;

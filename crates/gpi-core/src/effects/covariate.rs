@@ -36,6 +36,8 @@ impl Covariate {
     pub(super) const NAME: &'static str = "covariate";
     pub(super) const WHAT: &'static str =
         "another measured column leaks in, possibly through a lag";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["temperature", "disturbance column", "crosstalk", "cross-talk", "leak", "neighbour axis"];
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;

@@ -43,6 +43,8 @@ const LONGEST: f64 = 3e3;
 impl Creep {
     pub(super) const NAME: &'static str = "creep";
     pub(super) const WHAT: &'static str = "slow relaxation driven by the actuator's own motion";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["relaxation", "slow relaxation", "after-effect", "aftereffect", "viscoelasticity"];
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;

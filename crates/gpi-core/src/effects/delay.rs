@@ -21,6 +21,8 @@ const LONGEST: f64 = 100.0;
 impl Delay {
     pub(super) const NAME: &'static str = "delay";
     pub(super) const WHAT: &'static str = "dead time beyond the linear model's";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["dead time", "dead-time", "latency", "lag", "transport delay"];
     pub(super) const STAGE: Stage = Stage::Input;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;

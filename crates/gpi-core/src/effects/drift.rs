@@ -26,6 +26,8 @@ pub struct Drift {
 impl Drift {
     pub(super) const NAME: &'static str = "drift";
     pub(super) const WHAT: &'static str = "slow change that the input does not drive";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["thermal drift", "thermal", "trend", "offset drift", "wander", "baseline"];
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;

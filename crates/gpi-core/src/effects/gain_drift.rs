@@ -23,6 +23,8 @@ pub struct GainDrift {
 impl GainDrift {
     pub(super) const NAME: &'static str = "gain-drift";
     pub(super) const WHAT: &'static str = "sensitivity changes slowly with time";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["sensitivity drift", "gain change", "sensitivity", "scale drift"];
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;

@@ -44,6 +44,8 @@ impl HysteresisShape {
     pub(super) const NAME: &'static str = "hysteresis-shape";
     pub(super) const WHAT: &'static str =
         "minor loops are not congruent: outside the Prandtl-Ishlinskii class";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["asymmetry", "asymmetric hysteresis", "minor loops", "non-congruent", "congruency"];
     pub(super) const STAGE: Stage = Stage::Plays;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;

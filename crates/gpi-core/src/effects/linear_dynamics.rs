@@ -29,6 +29,8 @@ pub struct LinearDynamics {
 impl LinearDynamics {
     pub(super) const NAME: &'static str = "linear-dynamics";
     pub(super) const WHAT: &'static str = "a mode or an order that the linear part lacks";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["mode", "resonance", "dynamics", "order", "pole", "linear"];
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;

@@ -10,6 +10,7 @@ mod flaws;
 mod inner_loop;
 mod knots;
 mod loop_signals;
+mod names;
 mod place;
 mod properties;
 mod proposal;
@@ -27,6 +28,7 @@ pub use quantity::{Quantity, Units};
 pub use rate_dependence::SpeedLaw;
 
 pub(crate) use creep::longest_lag;
+pub(crate) use names::entries;
 pub(crate) use proposal::Proposal;
 pub(crate) use situation::Situation;
 
@@ -70,6 +72,7 @@ macro_rules! catalogue {
             const ENTRY: Entry = Entry {
                 name: $effect::NAME,
                 what: $effect::WHAT,
+                synonyms: $effect::SYNONYMS,
                 stage: $effect::STAGE,
                 driven: $effect::DRIVEN,
                 repeats: $effect::REPEATS,
@@ -123,6 +126,8 @@ pub struct Entry {
     pub name: &'static str,
     /// What it is, in a few words.
     pub what: &'static str,
+    /// Other words that people use for it, in lower case. A wrong name that is one of them gets its name as a suggestion.
+    pub synonyms: &'static [&'static str],
     /// Where it stands in the chain.
     pub stage: Stage,
     /// Whether the input (or another measured column) drives it, so that it is the same in another

@@ -20,6 +20,8 @@ pub struct Outliers {
 impl Outliers {
     pub(super) const NAME: &'static str = "outliers";
     pub(super) const WHAT: &'static str = "isolated wrong samples";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["outlier", "spikes", "spike", "wrong samples", "glitches", "dropouts"];
     pub(super) const STAGE: Stage = Stage::Noise;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = false;

@@ -24,6 +24,14 @@ pub struct OutputNonlinearity {
 impl OutputNonlinearity {
     pub(super) const NAME: &'static str = "output-nonlinearity";
     pub(super) const WHAT: &'static str = "a static curve after the dynamics: the sensor's";
+    pub(super) const SYNONYMS: &'static [&'static str] = &[
+        "sensor curve",
+        "sensor nonlinearity",
+        "sensor-nonlinearity",
+        "saturation",
+        "nonlinearity",
+        "static curve",
+    ];
     pub(super) const STAGE: Stage = Stage::Output;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;

@@ -32,6 +32,19 @@ impl PeriodicDisturbance {
     pub(super) const NAME: &'static str = "periodic-disturbance";
     pub(super) const WHAT: &'static str =
         "a line at a fixed frequency that the input does not drive";
+    pub(super) const SYNONYMS: &'static [&'static str] = &[
+        "mains",
+        "mains hum",
+        "hum",
+        "ripple",
+        "line",
+        "tone",
+        "50 hz",
+        "60 hz",
+        "vibration",
+        "pump",
+        "periodic",
+    ];
     pub(super) const STAGE: Stage = Stage::Added;
     pub(super) const DRIVEN: bool = false;
     pub(super) const REPEATS: bool = true;

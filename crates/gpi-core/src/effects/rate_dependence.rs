@@ -55,6 +55,13 @@ impl SpeedLaw {
 impl RateDependence {
     pub(super) const NAME: &'static str = "rate-dependence";
     pub(super) const WHAT: &'static str = "half-widths grow with the rate of the input";
+    pub(super) const SYNONYMS: &'static [&'static str] = &[
+        "rate-dependent",
+        "rate dependent",
+        "rate-dependent hysteresis",
+        "rate",
+        "frequency dependence",
+    ];
     pub(super) const STAGE: Stage = Stage::Plays;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = false;

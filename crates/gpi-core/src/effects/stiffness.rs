@@ -32,6 +32,8 @@ impl Stiffness {
     pub(super) const NAME: &'static str = "stiffness";
     pub(super) const WHAT: &'static str =
         "the resonance moves with amplitude: nonlinearity inside the mechanical loop";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["spring", "duffing", "nonlinear stiffness", "moving resonance", "hardening", "softening"];
     pub(super) const STAGE: Stage = Stage::Dynamics;
     pub(super) const DRIVEN: bool = true;
     pub(super) const REPEATS: bool = true;

@@ -115,7 +115,7 @@ pub(super) fn summarise(
     let test = holdout.unwrap_or(&state.setup.test);
     let tested = |model: &Model, residuals: &[Matrix]| match holdout {
         Some(other) => {
-            on_another_record(model, other, true, &mut |_, _| true).map(|found| found.residuals)
+            on_another_record(model, other, true, &mut |_| true).map(|found| found.residuals)
         }
         None => Ok(residuals.to_vec()),
     };

@@ -41,7 +41,8 @@ use crate::fit::RefineOptions;
 use crate::fit::joint::{Refined, fit_options};
 use crate::fit::preparation::starts_at_rest;
 use crate::identify::procedure::{compare, prepare};
-use crate::identify::{Grid, IdentifyOptions, Progress, Refinement};
+use crate::identify::{Grid, IdentifyOptions, Progress, Refinement, Report};
+use crate::progress::{Overall, ProgressSettings};
 use crate::spectrum::is_one_sine;
 use crate::uncertainty::outliers;
 use crate::{Error, Matrix, Record};
@@ -77,7 +78,7 @@ pub struct ExplainOptions {
 /// ```no_run
 /// use gpi_core::explain::{ExplainOptions, explain};
 /// # fn demo(record: &gpi_core::Record) -> Result<(), gpi_core::Error> {
-/// let found = explain(record, None, &ExplainOptions::default(), &mut |_, _| true)?;
+/// let found = explain(record, None, &ExplainOptions::default(), &mut |_| true)?;
 /// println!("{:?}: {} -> {}", found.effects, found.before.holdout.rms, found.after.holdout.rms);
 /// # Ok(())
 /// # }
@@ -103,10 +104,13 @@ pub fn explain(
     let outputs: Vec<Matrix> = training.experiments().iter().map(|e| e.output.clone()).collect();
     let spikes = outliers::places(&outputs, &repair::everything(&training)?, 0);
     let training = repair::repaired(&training, &outputs, &spikes)?;
+    let steps = ProgressSettings::usual()?;
+    let mut overall = Overall::new(progress, steps.light, steps.declared, steps.declaring);
     let mut prepared = prepare(&training, &identify)?;
     let measured = as_measured(&prepared.record, record, &prepared.means)?;
-    let mut refined = compare(&mut prepared, &identify, true, progress)?.refined;
-    refined.drop_undetermined(&prepared, progress)?;
+    let mut progress = |report: &Report| overall.take(report);
+    let mut refined = compare(&mut prepared, &identify, true, &mut progress)?.refined;
+    refined.drop_undetermined(&prepared, &mut progress)?;
     let order_is_given = identify.order.is_some() || identify.delay.is_some();
     // none at all is a grid too
     let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_) | Grid::Count(0)));
@@ -120,20 +124,24 @@ pub fn explain(
         SearchSetup::new(&prepared, weights, measured, allowed, order_is_given, moving, policy)?;
     let mut state = SearchState::new(&setup, prepared, &refined);
     state.repair()?;
-    revision::shed_lines(&mut state, progress)?;
+    overall.part(steps.searched, steps.search);
+    let mut progress = |report: &Report| overall.take(report);
+    revision::shed_lines(&mut state, &mut progress)?;
     let base = state.point.clone();
     // the last fit of the declared model may have led a pole to creep
-    revision::shed_lags(&mut state, progress)?;
-    let mut interrupted = is_interrupted(search::run(&mut state, progress))?;
+    revision::shed_lags(&mut state, &mut progress)?;
+    let mut interrupted = is_interrupted(search::run(&mut state, &mut progress))?;
     revision::settle_lags(&mut state)?;
     for entry in required {
         if !interrupted {
-            let forced = search::force(&mut state, entry, progress);
+            let forced = search::force(&mut state, entry, &mut progress);
             interrupted = is_interrupted(forced)?;
         }
     }
-    let mut patient = |_: &str, _: f64| true;
-    let last: Progress = if interrupted { &mut patient } else { progress };
+    let mut patient = |_: &Report| true;
+    overall.part(1.0, steps.last * steps.light);
+    let mut progress = |report: &Report| overall.take(report);
+    let last: Progress = if interrupted { &mut patient } else { &mut progress };
     let refinement = finish(&mut state, interrupted, last)?;
     // rules out that something in front of G is the only cause
     let has_loops = state.point.loops().next().is_some();
@@ -144,6 +152,9 @@ pub fn explain(
         None
     };
     let found = summarise(record, holdout, &base, state, refinement, interrupted)?;
+    if !interrupted {
+        overall.finish();
+    }
     let estimates = found.refinement.estimates(&found.model)?;
     let model = found.model.clone().with_estimates(estimates);
     Ok(Explanation { moved_resonance, model, ..found })

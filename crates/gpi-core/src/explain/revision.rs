@@ -29,6 +29,7 @@ use crate::effects::{CATALOGUE, Entry, FreeOrder, Place, Signature};
 use crate::fit::line_modes::{is_same, line_modes};
 use crate::fit::memory::Memory;
 use crate::fit::minimize::{FitOptions, Fitted};
+use crate::progress::as_trial;
 use nalgebra::Complex;
 
 /// Moves added signals to the other side of the output stage where that explains more.
@@ -63,7 +64,9 @@ pub(super) fn drop_superfluous(state: &mut SearchState, progress: Progress) -> R
             place += 1;
             continue;
         }
-        let fitted = without(state, place, newest.entry, progress)?;
+        let fitted = as_trial(progress, ("examination", name), (0, 1), |progress| {
+            without(state, place, newest.entry, progress)
+        })?;
         let lost = state.prepared.values() * (fitted.linearization.cost / state.cost).ln();
         let now = state.held_out(&state.point)?;
         let then = state.held_out(&fitted.point)?;
@@ -117,7 +120,9 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
         let options = FitOptions { steps, ..state.setup.options.clone() };
         let gain = score.gain;
         let start = start(state, &without, score)?;
-        let fitted = state.fit(start, &options, entry.name, progress)?;
+        let fitted = as_trial(progress, ("exchange", entry.name), (0, 1), |progress| {
+            state.fit(start, &options, entry.name, progress)
+        })?;
         let lost = state.prepared.values() * (fitted.linearization.cost / state.cost).ln();
         let named = state.additions.iter().find(|addition| addition.trial.entry.name == slow.name);
         let Some((deviance, threshold)) =
@@ -162,7 +167,9 @@ pub(super) fn exchange_slow(state: &mut SearchState, progress: Progress) -> Resu
         let Some(Ranked { entry, score, .. }) = best else { continue };
         let gain = score.gain;
         let start = start(state, &without, score)?;
-        let (fitted, options) = fitted(state, start, entry, progress)?;
+        let (fitted, options) = as_trial(progress, ("exchange", entry.name), (0, 1), |progress| {
+            fitted(state, start, entry, progress)
+        })?;
         let most = (1.0 - state.setup.policy.revision.other_side) * state.cost;
         if fitted.linearization.cost < most {
             let trial = measured(state, &without, entry, fitted, options, gain, progress)?;

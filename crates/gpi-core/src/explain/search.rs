@@ -13,10 +13,11 @@ use super::trial::{join_modes, trial, trials as trials_of};
 use crate::Error;
 use crate::effects::{Entry, FreeOrder, Signature, Stage};
 use crate::fit::minimize::Fitted;
-use crate::progress::Progress;
+use crate::progress::{Progress, as_trial, reached};
 
 /// Adds effects until nothing more is confirmed and all that was named passes the last examination.
 pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+    reached(progress, "score test", (state.cost / state.prepared.values()).sqrt())?;
     for _ in 0..state.setup.policy.revision.rounds {
         add_effects(state, progress)?;
         prefer_driven(state, progress)?;
@@ -194,7 +195,9 @@ pub(super) fn force(
         let requirement = "the record shows nothing to place it by; leave it out";
         return Err(Error::parameter("require", entry.name, requirement));
     };
-    let trial = trial(state, best, progress)?;
+    let trial = as_trial(progress, ("trials", entry.name), (0, 1), |progress| {
+        trial(state, best, progress)
+    })?;
     state.point = trial.point.clone();
     state.add(Addition { trial, others: Vec::new(), dropped: Vec::new() })
 }

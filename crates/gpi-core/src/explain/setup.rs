@@ -3,7 +3,7 @@
 use super::policy::SearchPolicy;
 use crate::chain::point::Point;
 use crate::chain::table::Table;
-use crate::effects::{CATALOGUE, Entry};
+use crate::effects::{CATALOGUE, Entry, entries};
 use crate::fit::RefineOptions;
 use crate::fit::joint::fit_options;
 use crate::fit::minimize::FitOptions;
@@ -85,12 +85,5 @@ pub(super) fn allowed(
     parameter: &'static str,
     names: Option<&[String]>,
 ) -> Result<Vec<&'static Entry>, Error> {
-    let Some(names) = names else { return Ok(CATALOGUE.iter().collect()) };
-    let find = |name: &String| {
-        CATALOGUE.iter().find(|entry| entry.name == name).ok_or_else(|| {
-            let known: Vec<&str> = CATALOGUE.iter().map(|entry| entry.name).collect();
-            Error::parameter(parameter, name, format!("one of {}", known.join(", ")))
-        })
-    };
-    names.iter().map(find).collect()
+    names.map_or_else(|| Ok(CATALOGUE.iter().collect()), |names| entries(parameter, names))
 }

@@ -34,6 +34,7 @@ use crate::fit::joint::Refined;
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::fit::preparation::rescale;
 use crate::optimize::Status;
+use crate::progress::{as_trial, reached};
 
 /// What a candidate became, or why its fit failed.
 pub(super) type Tried = Result<Trial, (&'static Entry, Error)>;
@@ -45,21 +46,25 @@ pub(super) fn trials(
     ranked: Vec<Ranked>,
     progress: Progress,
 ) -> Result<Vec<Tried>, Error> {
-    let tried = |one: Ranked, progress: Progress| -> Result<Tried, Error> {
+    let tried = |one: Ranked, place: (usize, usize), progress: Progress| -> Result<Tried, Error> {
         let entry = one.entry;
-        let trial = Error::unless_interrupted(trial(state, one, progress))?;
+        let trial = as_trial(progress, ("trials", entry.name), place, |progress| {
+            trial(state, one, progress)
+        });
+        let trial = Error::unless_interrupted(trial)?;
         Ok(trial.map_err(|error| (entry, error)))
     };
     if !state.setup.is_long(&state.point) {
-        return concurrently(ranked, progress, tried);
+        return concurrently(ranked, progress, |one, progress| tried(one, (0, 1), progress));
     }
     let mut trials: Vec<Tried> = Vec::new();
-    for one in ranked {
+    let all = ranked.len();
+    for (place, one) in ranked.into_iter().enumerate() {
         let deviances = trials.iter().flatten().map(|trial| trial.deviance);
         let best = deviances.fold(0.0, f64::max);
         let own = promised(state.prepared.values(), one.score.gain);
         if own >= state.setup.policy.ranking.near * best {
-            trials.push(tried(one, progress)?);
+            trials.push(tried(one, (place, all), progress)?);
         }
     }
     Ok(trials)
@@ -75,6 +80,7 @@ pub(super) fn trial(
     let start = start(state, &state.point, score)?;
     let (fitted, options) = fitted(state, start, entry, progress)?;
     let trial = measured(state, &state.point, entry, fitted, options, gain, progress)?;
+    reached(progress, entry.name, (trial.cost / state.prepared.values()).sqrt())?;
     if entry.stage != Stage::Plays || trial.deviance <= trial.threshold {
         return Ok(trial);
     }

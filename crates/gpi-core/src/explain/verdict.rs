@@ -103,6 +103,15 @@ fn separation(by: SeparatedBy) -> (&'static str, &'static str) {
     }
 }
 
+/// A number that can be typed: four significant digits, all digits before the point.
+fn typed(number: f64) -> f64 {
+    if number == 0.0 || !number.is_finite() {
+        return 0.0;
+    }
+    let digits = (3 - number.abs().log10().floor() as i32).max(0);
+    format!("{number:.*}", digits as usize).parse().unwrap_or(number)
+}
+
 /// What to measure next: what separates effects that this record cannot tell apart, or what shows more of the structure
 /// that is left.
 pub(super) fn next_experiment(
@@ -117,11 +126,14 @@ pub(super) fn next_experiment(
     let rate = record.rate();
     let duration = policy.seconds.min(policy.samples / rate);
     let command = |kind: &str| {
-        // a number that can be typed
-        let frequency = format!(" --frequency {}", (1e4 * policy.periods / duration).round() / 1e4);
+        let frequency = format!(" --frequency {}", typed(policy.periods / duration));
         let frequency = if kind == TRIANGLE { frequency } else { String::new() };
         format!(
-            "gpi excite {kind} --rate {rate} --duration {duration}{frequency} --range {low} {high} -o next.csv"
+            "gpi excite {kind} --rate {} --duration {}{frequency} --range {},{} -o next.csv",
+            typed(rate),
+            typed(duration),
+            typed(low),
+            typed(high)
         )
     };
     let confounded = rejected.iter().find(|one| !one.confounded_with.is_empty());
@@ -190,10 +202,20 @@ mod tests {
     }
 
     #[test]
+    fn numbers_of_a_command_have_four_digits() {
+        assert_eq!(typed(0.120_399_999_999_999_95).to_string(), "0.1204");
+        assert_eq!(typed(-12_345.678).to_string(), "-12346");
+        assert_eq!(typed(9.999_96).to_string(), "10");
+        assert_eq!((typed(0.0), typed(1e-5), typed(100.0)), (0.0, 1e-5, 100.0));
+    }
+
+    #[test]
     fn the_command_makes_the_input_that_is_asked_for() {
         let next = confused("drift", "creep");
         assert!(next.why.contains("hold the input still"), "{}", next.why);
         assert!(next.command.starts_with("gpi excite steps --rate 1000 --duration 600 --range "));
+        let range = next.command.split("--range ").nth(1).unwrap().split(' ').next().unwrap();
+        assert!(range.split(',').all(|end| end.trim_start_matches('-').len() <= 6), "{range}");
         let next = confused("backlash", "hysteresis-shape");
         assert!(next.why.contains("triangles"), "{}", next.why);
         assert!(

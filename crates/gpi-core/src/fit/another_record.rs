@@ -46,7 +46,7 @@ pub struct OnAnotherRecord {
 /// let output = model.simulate(&input)?;
 /// let later = |signal: &Matrix| signal.rows(1000, 2000).into_owned();
 /// let record = Record::new(vec![Experiment::new(later(&input), later(&output))], 1e3, u, y, vec![])?;
-/// let found = on_another_record(&model, &record, true, &mut |_, _| true)?;
+/// let found = on_another_record(&model, &record, true, &mut |_| true)?;
 /// assert!(found.error(&record, false).rms < 1e-3 * model.error(&record, false)?.rms);
 /// # Ok::<(), gpi_core::Error>(())
 /// ```

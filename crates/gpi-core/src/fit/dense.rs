@@ -190,13 +190,13 @@ mod tests {
         let point = prepared.point(Sections::delayed_gain(&unit, 0));
         let free = RefineOptions { half_widths: true, ..RefineOptions::default() };
         let options = fit_options(&prepared, &free, 60);
-        let mut quiet = |_: &str, _: f64| true;
+        let mut quiet = |_: &crate::Report| true;
         let mut fitted = |point: Point| {
             let found = fit(point, &prepared.record, &options, "test", &mut quiet).unwrap();
             ((found.linearization.cost / 4000.0).sqrt(), found.point)
         };
         let (alone, _) = fitted(point.clone());
-        let rich = dense(&point, &prepared, &mut |_, _| true).unwrap();
+        let rich = dense(&point, &prepared, &mut |_| true).unwrap();
         let (rms, found) = fitted(rich);
         assert!(rms < 0.2 * alone, "{rms} {alone}");
         // the weights of all plays around each true one

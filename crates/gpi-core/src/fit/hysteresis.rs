@@ -4,7 +4,6 @@
 //! in D has the weight 1, which fixes it. A play of half-width r does not depend on its initial state from the first
 //! sample at which z has spanned 2 r, since its output has then touched z - r and z + r.
 
-use crate::Progress;
 use crate::chain::bounds::range;
 use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{DynamicsFreedom, Freedom, Past, Point};
@@ -15,6 +14,7 @@ use crate::fit::settings::HysteresisSettings;
 use crate::linear::Sections;
 use crate::operators::Reading;
 use crate::optimize::{Loss, Status};
+use crate::progress::{Overall, Progress, Report};
 use crate::{Channel, Error, Experiment, Hysteresis, Matrix, Record};
 use nalgebra::DVector;
 
@@ -61,7 +61,7 @@ pub struct HysteresisFit {
 /// let mut v = u.clone();
 /// bank.in_place(&mut bank.rest(), &mut v);
 /// let grid = Grid::Values(vec![0.0, 0.5, 1.0, 1.5, 2.0]);
-/// let fit = fit_hysteresis(&u, &v, &grid, &Grid::Count(0), &mut |_, _| true)?;
+/// let fit = fit_hysteresis(&u, &v, &grid, &Grid::Count(0), &mut |_| true)?;
 /// assert!(fit.rms < 1e-6);
 /// # Ok::<(), gpi_core::Error>(())
 /// ```
@@ -126,7 +126,10 @@ pub fn fit_hysteresis(
     settings.validate()?;
     let HysteresisSettings { steps, gain } = settings;
     let options = FitOptions { freedom, loss: Loss::squares(1), steps, gain };
-    let fitted = fit(point, &record, &options, "hysteresis", progress)?;
+    let mut overall = Overall::new(progress, 1.0, 1.0, 1.0);
+    let mut progress = |report: &Report| overall.take(report);
+    let fitted = fit(point, &record, &options, "hysteresis", &mut progress)?;
+    overall.finish();
     let channel = &fitted.point.channels[0];
     let z = channel.envelope(0.0, u[0]);
     let sides = fitted.point.pasts[0].plays.iter().flatten().flatten();

@@ -100,7 +100,7 @@ pub(crate) fn joint(
     let mut history = Vec::new();
     if hopeless.is_finite() {
         let first = FitOptions { steps: own.first_steps, ..fit_options.clone() };
-        let fitted = fit(point, record, &first, "structure", progress)?;
+        let fitted = fit(point, record, &first, "grids", progress)?;
         if fitted.linearization.cost > hopeless {
             return Ok(Refined { fitted, options: fit_options, outliers: 0, robust: false });
         }

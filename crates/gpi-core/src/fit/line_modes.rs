@@ -163,7 +163,7 @@ mod tests {
             thresholds: Some(Grid::Count(0)),
             ..IdentifyOptions::default()
         };
-        let found = identify(record, &options, &mut |_, _| true).unwrap();
+        let found = identify(record, &options, &mut |_| true).unwrap();
         let poles = found.model.linear().poles().unwrap();
         poles.iter().filter(|pole| pole.im > 0.0).map(|pole| pole.arg() * RATE / TAU).collect()
     }

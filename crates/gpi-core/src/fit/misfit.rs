@@ -96,7 +96,7 @@ mod tests {
             thresholds: Some(crate::identify::Grid::Count(0)),
             ..IdentifyOptions::default()
         };
-        let found = identify(&record, &options, &mut |_, _| true).unwrap();
+        let found = identify(&record, &options, &mut |_| true).unwrap();
         let model = found.model.with_prediction(&found.refinement, &record).unwrap();
         let prediction = model.prediction().unwrap();
         (prediction.misfit()[0], prediction.movement()[0])

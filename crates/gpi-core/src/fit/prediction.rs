@@ -62,7 +62,7 @@ impl Model {
     /// let options = IdentifyOptions {
     ///     delay: Some(0), half_widths: plays, thresholds: deadzones, ..IdentifyOptions::default()
     /// };
-    /// let found = identify(&record, &options, &mut |_, _| true)?;
+    /// let found = identify(&record, &options, &mut |_| true)?;
     /// let model = found.model.with_prediction(&found.refinement, &record)?;
     /// assert!(model.prediction().is_some());
     /// # Ok::<(), gpi_core::Error>(())

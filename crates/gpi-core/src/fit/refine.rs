@@ -11,7 +11,7 @@ use crate::chain::hysteresis::Parameters;
 use crate::fit::joint::joint;
 use crate::fit::preparation::{Prepared, require_match};
 use crate::fit::refinement::{RefineOptions, Refinement};
-use crate::progress::Progress;
+use crate::progress::{Overall, Progress, ProgressSettings, Report};
 use crate::{Error, Model, Record};
 
 /// Refines a model on a record: Levenberg-Marquardt on the simulation error, with respect to all
@@ -40,7 +40,7 @@ use crate::{Error, Model, Record};
 /// let output = model(0.5, 0.6)?.simulate(&input)?;
 /// let run = Experiment { input, output, covariates: Matrix::zeros(2000, 0), warmup: 500, held_out: vec![] };
 /// let record = Record::new(vec![run], 1.0, vec![Channel::new("u", "")], vec![Channel::new("y", "")], vec![])?;
-/// let (refined, how) = refine(&model(0.7, 0.5)?, &record, &RefineOptions::default(), &mut |_, _| true)?;
+/// let (refined, how) = refine(&model(0.7, 0.5)?, &record, &RefineOptions::default(), &mut |_| true)?;
 /// assert!((refined.hysteresis()[0].plays().weights()[1] - 0.5).abs() < 1e-6);
 /// assert!((how.history.last().unwrap() / how.history[0]) < 1e-6);
 /// # Ok::<(), gpi_core::Error>(())
@@ -66,8 +66,11 @@ pub fn refine(
             remedy: "a refinement starts from a stable model",
         });
     }
-    let refined = joint(point, &prepared, options, f64::INFINITY, false, progress)?;
-    let refinement = refined.finish(&prepared, progress)?;
+    let mut overall = Overall::new(progress, 1.0, 1.0, ProgressSettings::usual()?.last);
+    let mut progress = |report: &Report| overall.take(report);
+    let refined = joint(point, &prepared, options, f64::INFINITY, false, &mut progress)?;
+    let refinement = refined.finish(&prepared, &mut progress)?;
+    overall.finish();
     let model = refinement.bands.point.to_model(record, &prepared.record, &prepared.means)?;
     let estimates = refinement.estimates(&model)?;
     Ok((model.with_estimates(estimates), refinement))

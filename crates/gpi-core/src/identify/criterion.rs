@@ -26,7 +26,7 @@ use crate::fit::memory::Memory;
 use crate::fit::preparation::Prepared;
 use crate::identify::identification::Candidate;
 use crate::identify::settings::StructurePolicy;
-use crate::progress::Progress;
+use crate::progress::{Progress, as_trial, reached};
 use crate::uncertainty::noise_model::NoiseModel;
 use nalgebra::Complex;
 use std::f64::consts::PI;
@@ -90,7 +90,10 @@ impl<'a> Comparison<'a> {
     /// Refines a point; says whether it is better than all before. A point whose computation fails is dropped.
     pub(super) fn offer(&mut self, point: Point, progress: Progress) -> Result<bool, Error> {
         self.has_failed = false;
-        let offered = self.refine(point, progress);
+        let trial = described(&point);
+        let offered = as_trial(progress, ("structures", &trial), (0, 1), |progress| {
+            self.refine(point, progress)
+        });
         Ok(Error::unless_interrupted(offered)?.unwrap_or_else(|error| {
             self.drop_failed(error);
             false
@@ -122,13 +125,15 @@ impl<'a> Comparison<'a> {
         refined.fitted.point.dynamics.to_state_space()?;
         let uncertainty = refined.uncertainty(&self.prepared.record, progress)?;
         let parameters = uncertainty.estimated;
+        let rms = (refined.fitted.linearization.cost / self.prepared.values()).sqrt();
+        reached(progress, "uncertainty", rms)?;
         let point = &refined.fitted.point;
         self.candidates.push(Candidate {
             delay: point.dynamics.delay,
             order: point.dynamics.order(),
             plays: point.channels[0].half_widths.len(),
             deadzones: point.channels[0].thresholds.len() - 1,
-            rms: (refined.fitted.linearization.cost / self.prepared.values()).sqrt(),
+            rms,
             parameters,
             used: 0.0,
             criterion: 0.0,
@@ -250,4 +255,13 @@ impl<'a> Comparison<'a> {
         let chosen = self.chosen()?;
         Some((chosen, self.refined.swap_remove(chosen).refined, self.candidates))
     }
+}
+
+/// A structure in words, for the progress.
+fn described(point: &Point) -> String {
+    let (dynamics, channel) = (&point.dynamics, &point.channels[0]);
+    let (plays, zones) = (channel.half_widths.len(), channel.thresholds.len() - 1);
+    let delay =
+        if dynamics.delay > 0 { format!(", delay {}", dynamics.delay) } else { String::new() };
+    format!("order {}{delay}, {plays} plays, {zones} deadzones", dynamics.order())
 }

@@ -22,7 +22,7 @@ pub use crate::fit::{
     Status, fit_hysteresis, functions_of_time, on_another_record, refine,
     residuals_from_fitted_start, sensitivities,
 };
-pub use crate::progress::Progress;
+pub use crate::progress::{Progress, Report};
 pub use crate::uncertainty::{Bands, NoiseFloor, NoiseMethod, PoleDeviations, ResponseDeviation};
 pub use identification::{Candidate, Identification, IdentifyOptions, Round};
 pub use procedure::identify;

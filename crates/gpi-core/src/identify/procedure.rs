@@ -23,7 +23,7 @@ use crate::identify::quasi_static;
 use crate::identify::settings::{AlternationPolicy, IdentifySettings, TapPolicy};
 use crate::identify::structure::StructureSearch;
 use crate::linear::{Fir, excitation_limit};
-use crate::progress::{Progress, report};
+use crate::progress::{Overall, Progress, ProgressSettings, Report, report};
 use crate::{Error, Record};
 
 /// Identifies a model from a record.
@@ -40,9 +40,14 @@ pub fn identify(
     options: &IdentifyOptions,
     progress: Progress,
 ) -> Result<Identification, Error> {
+    let ProgressSettings { light, structures, identified, last, .. } = ProgressSettings::usual()?;
+    let mut overall = Overall::new(progress, light, identified, structures);
     let mut prepared = prepare(record, options)?;
-    let found = compare(&mut prepared, options, false, progress)?;
-    finish(&prepared, found, progress)
+    let found = compare(&mut prepared, options, false, &mut |report| overall.take(report))?;
+    overall.part(1.0, last * light);
+    let found = finish(&prepared, found, &mut |report| overall.take(report))?;
+    overall.finish();
+    Ok(found)
 }
 
 /// The structures that were compared on a prepared record.
@@ -135,7 +140,7 @@ pub(crate) fn compare(
     let mut search = StructureSearch::new(prepared, &settings.structure, options, fast);
     search.climb(&seed.point, progress)?;
     if options.order.is_none() {
-        let mut quiet = |_: &str, _: f64| true;
+        let mut quiet = |_: &Report| true;
         let mut dynamics = |driven: &Record, order: usize| {
             alternation::dynamics_of(driven, &mut few, Some(order), settings, &mut quiet)?
                 .sections()

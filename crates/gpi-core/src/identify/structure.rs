@@ -220,7 +220,7 @@ impl<'a> StructureSearch<'a> {
         options.gain = policy.gain;
         for place_again in [true, false] {
             prepared.settle(&mut point);
-            point = fit(point, &prepared.record, &options, "structure", progress)?.point;
+            point = fit(point, &prepared.record, &options, "grids", progress)?.point;
             if place_again {
                 prepared.place(&mut point, half_widths)?;
             }

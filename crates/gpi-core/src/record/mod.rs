@@ -3,6 +3,7 @@
 mod channel;
 mod experiment;
 mod names;
+mod slices;
 mod time_axis;
 
 pub use channel::Channel;

@@ -4,18 +4,18 @@ mod explanation;
 mod residual_tests;
 mod rows;
 
+use crate::calls;
 use crate::errors::to_python;
 use crate::identify::grid;
 use crate::model::Refinement;
 use crate::operators::read_reading;
 use crate::progress::interruptible_in_part;
-use crate::record::Record;
 use explanation::Explanation;
 use gpi_core::effects::CATALOGUE;
 use gpi_core::explain as core;
 use gpi_core::identify::IdentifyOptions;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 
 /// Finds the effects that a record's declared model lacks, and adds them to the model.
 ///
@@ -27,14 +27,14 @@ use pyo3::types::PyDict;
 ///
 /// Parameters
 /// ----------
-/// record : Record
+/// record : Record or path
 ///     Measured input and output.
-/// holdout : Record, optional
+/// holdout : Record or path, optional
 ///     Another experiment with the same actuator for validation. Effects that the input does not drive are not simulated
 ///     on it.
-/// effects : sequence of str, optional
+/// effects : str or sequence of str, optional
 ///     Names of the effects that may be added (see ``effect_names``); all when left out, none if empty.
-/// require : sequence of str, optional
+/// require : str or sequence of str, optional
 ///     Names of effects that are added in any case. The evidence of the step shows their gain.
 /// order : int, optional
 ///     Order of G in the declared model. A missing mode and a missing delay are then reported as effects.
@@ -47,7 +47,7 @@ use pyo3::types::PyDict;
 /// reading : {"one-sided", "directional"}
 ///     The deadzone convention, as in ``Deadzones``.
 /// progress : callable, optional
-///     Called with the name of the current step and the fraction done. An exception ends the search, as Ctrl-C does: the
+///     Called with a ``Progress``: the stage, the trial, the fraction done and the best error so far. An exception ends the search, as Ctrl-C does: the
 ///     effects found so far are returned, with ``interrupted`` set. Before the declared model is identified, the
 ///     exception is raised.
 ///
@@ -69,21 +69,26 @@ use pyo3::types::PyDict;
 /// >>> found.effects, found.verdict  # doctest: +SKIP
 /// (['creep'], 'explained')
 #[pyfunction]
-#[pyo3(signature = (record, holdout = None, *, effects = None, require = None, order = None, half_widths = None,
-    thresholds = None, delay = None, reading = "one-sided", progress = None))]
+#[pyo3(signature = (record, holdout = None, *extra, effects = None, require = None, order = None, half_widths = None,
+    thresholds = None, delay = None, reading = "one-sided", progress = None, **others),
+    text_signature = "(record, holdout=None, *, effects=None, require=None, order=None, half_widths=None, \
+thresholds=None, delay=None, reading='one-sided', progress=None)")]
 fn explain(
     py: Python<'_>,
-    record: Py<Record>,
-    holdout: Option<&Record>,
-    effects: Option<Vec<String>>,
-    require: Option<Vec<String>>,
+    record: &Bound<'_, PyAny>,
+    holdout: Option<&Bound<'_, PyAny>>,
+    extra: &Bound<'_, PyTuple>,
+    effects: Option<&Bound<'_, PyAny>>,
+    require: Option<&Bound<'_, PyAny>>,
     order: Option<usize>,
     half_widths: Option<&Bound<'_, PyAny>>,
     thresholds: Option<&Bound<'_, PyAny>>,
     delay: Option<usize>,
     reading: &str,
     progress: Option<Py<PyAny>>,
+    others: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Explanation> {
+    calls::only_a_record("explain", record, extra, others)?;
     let identify = IdentifyOptions {
         order,
         delay,
@@ -92,15 +97,18 @@ fn explain(
         reading: read_reading(reading)?,
         ..IdentifyOptions::default()
     };
-    let options = core::ExplainOptions { identify, effects, require: require.unwrap_or_default() };
-    let own = record.bind(py).borrow();
-    let (measured, holdout) = (&own.record, holdout.map(|other| &other.record));
+    let effects = calls::effect_names("effects", effects)?;
+    let require = calls::effect_names("require", require)?.unwrap_or_default();
+    let options = core::ExplainOptions { identify, effects, require };
+    let record = calls::record("record", record, "gpi.explain(")?;
+    let holdout = calls::optional_record("holdout", holdout, "gpi.explain(record, ")?;
+    let measured = &record.get().record;
+    let holdout = holdout.as_ref().map(|other| &other.get().record);
     let on_another_record = holdout.is_some();
     let mut found = interruptible_in_part(py, progress, |report| {
         core::explain(measured, holdout, &options, report)
     })?;
     found.model = found.model.with_prediction(&found.refinement, measured).map_err(to_python)?;
-    drop(own);
     let refinement = Py::new(py, Refinement::new(&found.model, found.refinement.clone())?)?;
     Ok(Explanation { found, record, refinement, on_another_record })
 }

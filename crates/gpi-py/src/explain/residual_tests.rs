@@ -1,9 +1,9 @@
 //! Tests of a model's residual on a record.
 
 use super::rows;
+use crate::calls;
 use crate::model::Model;
 use crate::progress::interruptible;
-use crate::record::Record;
 use gpi_core::explain as core;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -24,7 +24,7 @@ use pyo3::types::PyDict;
 /// ----------
 /// model : Model
 ///     The model. It need not have been identified from this record.
-/// record : Record
+/// record : Record or path
 ///     Measured input u, shape (samples, inputs), and output y, shape (samples, outputs).
 /// fit_start : bool
 ///     Whether to estimate unknown initial states first, as in ``Model.error``.
@@ -66,11 +66,12 @@ use pyo3::types::PyDict;
 pub(super) fn residual_tests<'py>(
     py: Python<'py>,
     model: &Model,
-    record: &Record,
+    record: &Bound<'_, PyAny>,
     fit_start: bool,
     remove_mean: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (model, record) = (&model.model, &record.record);
+    let record = calls::record("record", record, "gpi.residual_tests(model, ")?;
+    let (model, record) = (&model.model, &record.get().record);
     let options = core::ResidualOptions { fit_start, remove_mean };
     let tests =
         interruptible(py, None, |report| core::residual_tests(model, record, &options, report))?;

@@ -88,7 +88,7 @@ impl HysteresisFit {
 ///     The number of thresholds, which are distributed over the range of u, or their values, in the unit of u; 10 when
 ///     left out.
 /// progress : callable, optional
-///     Called with the name of the current step and the fraction done; an exception stops the fit.
+///     Called with a ``Progress``: the stage, the fraction done and the elapsed time; an exception stops the fit.
 ///
 /// Returns
 /// -------

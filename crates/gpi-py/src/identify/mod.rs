@@ -7,13 +7,14 @@ mod sensitivities;
 
 pub(crate) use grid::grid;
 
+use crate::calls;
 use crate::errors::to_python;
 use crate::model::{Identification, Model, Refinement};
 use crate::operators::read_reading;
 use crate::progress::interruptible;
-use crate::record::Record;
 use gpi_core::identify::{self as core, IdentifyOptions};
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
 
 /// Identifies a model from a record.
 ///
@@ -24,8 +25,8 @@ use pyo3::prelude::*;
 ///
 /// Parameters
 /// ----------
-/// record : Record
-///     Training data. All of its scored samples are used.
+/// record : Record or path
+///     Training data, or the file that ``read_record`` reads them from. All of its scored samples are used.
 /// taps : int, optional
 ///     Number of taps of the FIR estimate; chosen from the slowest pole when left out.
 /// order : int, optional
@@ -45,7 +46,7 @@ use pyo3::prelude::*;
 /// offset_knots : int
 ///     Number of knots of a slowly varying offset of each experiment, as in ``refine``.
 /// progress : callable, optional
-///     Called with the name of the current step and the fraction done; an exception stops the work.
+///     Called with a ``Progress``: the stage, the trial, the fraction done and the best error so far; an exception stops the work.
 ///
 /// Returns
 /// -------
@@ -70,11 +71,14 @@ use pyo3::prelude::*;
 /// >>> model.error(record)["fit_percent"] > 99
 /// True
 #[pyfunction]
-#[pyo3(signature = (record, *, taps = None, order = None, half_widths = None, thresholds = None,
-    reading = "one-sided", delay = None, robust = None, offset_knots = 1, progress = None))]
+#[pyo3(signature = (record, *extra, taps = None, order = None, half_widths = None, thresholds = None,
+    reading = "one-sided", delay = None, robust = None, offset_knots = 1, progress = None, **others),
+    text_signature = "(record, *, taps=None, order=None, half_widths=None, thresholds=None, \
+reading='one-sided', delay=None, robust=None, offset_knots=1, progress=None)")]
 fn identify(
     py: Python<'_>,
-    record: &Record,
+    record: &Bound<'_, PyAny>,
+    extra: &Bound<'_, PyTuple>,
     taps: Option<usize>,
     order: Option<usize>,
     half_widths: Option<&Bound<'_, PyAny>>,
@@ -84,7 +88,10 @@ fn identify(
     robust: Option<bool>,
     offset_knots: usize,
     progress: Option<Py<PyAny>>,
+    others: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Model> {
+    calls::only_a_record("identify", record, extra, others)?;
+    let record = calls::record("record", record, "gpi.identify(")?;
     let options = IdentifyOptions {
         taps,
         order,
@@ -95,7 +102,7 @@ fn identify(
         robust,
         offset_knots,
     };
-    let record = &record.record;
+    let record = &record.get().record;
     let found = interruptible(py, progress, |report| core::identify(record, &options, report))?;
     let model =
         found.model.clone().with_prediction(&found.refinement, record).map_err(to_python)?;

@@ -1,9 +1,9 @@
 //! Joint refinement of all parts of a model.
 
+use crate::calls;
 use crate::errors::to_python;
 use crate::model::{Model, Refinement};
 use crate::progress::interruptible;
-use crate::record::Record;
 use gpi_core::identify::{self as core, RefineOptions};
 use pyo3::prelude::*;
 
@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 /// ----------
 /// model : Model
 ///     Initial model.
-/// record : Record
+/// record : Record or path
 ///     Training data.
 /// thresholds : bool
 ///     Whether to estimate the thresholds of the deadzones too; they keep their signs.
@@ -30,7 +30,7 @@ use pyo3::prelude::*;
 /// offset_knots : int
 ///     Number of knots of a slowly varying offset of each experiment; the model keeps the mean of the offset.
 /// progress : callable, optional
-///     Called with the name of the current step and the fraction done; an exception stops the work.
+///     Called with a ``Progress``: the stage, the trial, the fraction done and the best error so far; an exception stops the work.
 ///
 /// Returns
 /// -------
@@ -61,7 +61,7 @@ use pyo3::prelude::*;
 pub(super) fn refine(
     py: Python<'_>,
     model: &Model,
-    record: &Record,
+    record: &Bound<'_, PyAny>,
     thresholds: bool,
     half_widths: bool,
     robust: Option<bool>,
@@ -69,7 +69,8 @@ pub(super) fn refine(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Model> {
     let options = RefineOptions { thresholds, half_widths, robust, offset_knots };
-    let (start, record) = (&model.model, &record.record);
+    let record = calls::record("record", record, "gpi.refine(model, ")?;
+    let (start, record) = (&model.model, &record.get().record);
     let (refined, refinement) =
         interruptible(py, progress, |report| core::refine(start, record, &options, report))?;
     let refined = refined.with_prediction(&refinement, record).map_err(to_python)?;

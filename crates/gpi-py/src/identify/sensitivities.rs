@@ -1,9 +1,9 @@
 //! Derivatives of a model's simulated output.
 
 use crate::arrays::{from_matrices, from_matrix, from_vector};
+use crate::calls;
 use crate::model::Model;
 use crate::progress::interruptible;
-use crate::record::Record;
 use gpi_core::identify::{self as core, RefineOptions};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -17,7 +17,7 @@ use pyo3::types::PyDict;
 /// ----------
 /// model : Model
 ///     The model at which the derivatives are taken.
-/// record : Record
+/// record : Record or path
 ///     The input, and the output for the gradient.
 /// thresholds, half_widths : bool
 ///     Whether these are among the parameters, as in ``refine``.
@@ -53,13 +53,14 @@ use pyo3::types::PyDict;
 pub(super) fn sensitivities<'py>(
     py: Python<'py>,
     model: &Model,
-    record: &Record,
+    record: &Bound<'_, PyAny>,
     thresholds: bool,
     half_widths: bool,
     offset_knots: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
     let options = RefineOptions { thresholds, half_widths, robust: None, offset_knots };
-    let (model, record) = (&model.model, &record.record);
+    let record = calls::record("record", record, "gpi.sensitivities(model, ")?;
+    let (model, record) = (&model.model, &record.get().record);
     let found =
         interruptible(py, None, |report| core::sensitivities(model, record, &options, report))?;
     let result = PyDict::new(py);

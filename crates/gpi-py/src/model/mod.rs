@@ -10,9 +10,10 @@ pub(crate) use refinement::Refinement;
 pub(crate) use state::read as read_state;
 
 use crate::arrays::{from_matrix, from_signal, from_vector, signal, vector};
+use crate::calls;
 use crate::channels::{label, names, units};
 use crate::compensate::{self, Compensation, Compensator};
-use crate::errors::to_python;
+use crate::errors::{parameter, to_python};
 use crate::figures::figures;
 use crate::linear::StateSpace;
 use crate::operators::Gpi;
@@ -23,7 +24,7 @@ use gpi_core::compensate::CompensateOptions;
 use gpi_core::identify::{functions_of_time, on_another_record, residuals_from_fitted_start};
 use gpi_core::{Matrix, SimulationError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList};
 
 /// A Hammerstein model: ``y = G(q) P[D[u]] + offset``, one hysteresis per input.
 ///
@@ -53,6 +54,21 @@ impl Model {
         } else {
             model.residuals(record).map_err(to_python)
         }
+    }
+
+    /// The outputs of all experiments of a record, with its own measured columns.
+    fn simulate_record<'py>(
+        &self,
+        py: Python<'py>,
+        record: &Record,
+        has_covariates: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if has_covariates {
+            return Err(parameter("`covariates`: a record has its own; leave them out".to_owned()));
+        }
+        let simulated = self.model.simulate_record(&record.record).map_err(to_python)?;
+        let outputs = simulated.iter().map(|output| from_matrix(py, output));
+        Ok(PyList::new(py, outputs)?.into_any())
     }
 }
 
@@ -142,11 +158,12 @@ impl Model {
     fn on_another_record<'py>(
         &self,
         py: Python<'py>,
-        record: &Record,
+        record: &Bound<'py, PyAny>,
         fit_start: bool,
         remove_mean: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let (model, record) = (&self.model, &record.record);
+        let record = calls::record("record", record, "model.on_another_record(")?;
+        let (model, record) = (&self.model, &record.get().record);
         let found =
             interruptible(py, None, |report| on_another_record(model, record, fit_start, report))?;
         let result = PyDict::new(py);
@@ -164,6 +181,9 @@ impl Model {
         u: &Bound<'py, PyAny>,
         covariates: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        if let Ok(record) = u.cast::<Record>() {
+            return self.simulate_record(u.py(), record.get(), covariates.is_some());
+        }
         let (input, one_dimensional) = signal("u", u)?;
         let columns = match covariates {
             None => Matrix::zeros(input.nrows(), 0),
@@ -206,12 +226,13 @@ impl Model {
     fn error<'py>(
         &self,
         py: Python<'py>,
-        record: &Record,
+        record: &Bound<'py, PyAny>,
         remove_mean: bool,
         fit_start: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let residuals = self.residuals(py, record, fit_start)?;
-        figures(py, &SimulationError::of(&record.record, &residuals, remove_mean))
+        let record = calls::record("record", record, "model.error(")?;
+        let residuals = self.residuals(py, record.get(), fit_start)?;
+        figures(py, &SimulationError::of(&record.get().record, &residuals, remove_mean))
     }
 
     #[doc = include_str!("../docs/model/compensate.txt")]
@@ -249,11 +270,48 @@ impl Model {
     fn residual<'py>(
         &self,
         py: Python<'py>,
-        record: &Record,
+        record: &Bound<'py, PyAny>,
         fit_start: bool,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        let residuals = self.residuals(py, record, fit_start)?;
+        let record = calls::record("record", record, "model.residual(")?;
+        let residuals = self.residuals(py, record.get(), fit_start)?;
         Ok(residuals.iter().map(|residual| from_matrix(py, residual)).collect())
+    }
+
+    #[doc = include_str!("../docs/model/compare.txt")]
+    #[pyo3(signature = (record, *, fit_start = true, remove_mean = false))]
+    fn compare<'py>(
+        slf: &Bound<'py, Self>,
+        record: &Bound<'py, PyAny>,
+        fit_start: bool,
+        remove_mean: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = slf.py();
+        let record = calls::record("record", record, "model.compare(")?;
+        let options = PyDict::new(py);
+        options.set_item("fit_start", fit_start)?;
+        options.set_item("remove_mean", remove_mean)?;
+        let module = py.import("gpi_hammerstein.compared")?;
+        module.call_method("compare", (slf, record), Some(&options))
+    }
+
+    /// The parameters of the model with their values and standard deviations, a list of ``Parameter``.
+    ///
+    /// First come the parameters of a refinement, as in ``Refinement.parameters``; for a model without one, the weights,
+    /// half-widths, thresholds and offsets with unknown standard deviations. Then come those of the effects.
+    #[getter]
+    fn parameters<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("gpi_hammerstein.summary")?.call_method1("parameters", (slf,))
+    }
+
+    /// The model as a text table: structure, fit, parameters with their standard deviations, poles, effects.
+    ///
+    /// Returns
+    /// -------
+    /// Summary
+    ///     A text, which ``print`` and a notebook show as a table.
+    fn summary<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("gpi_hammerstein.summary")?.call_method1("summary", (slf,))
     }
 
     #[doc = include_str!("../docs/model/to_json.txt")]

@@ -2,10 +2,11 @@
 
 import typer
 
+from gpi_hammerstein.cli.help import Command, Group
 from gpi_hammerstein.cli.reproduce.paper import paper_command
 from gpi_hammerstein.cli.reproduce.steering_mirror import steering_mirror_command
 
-reproduce: typer.Typer = typer.Typer(no_args_is_help=True, help="Reproduce published examples.")
+reproduce: typer.Typer = typer.Typer(cls=Group, no_args_is_help=True, help="Reproduce published examples.")
 
 
 @reproduce.callback()
@@ -13,5 +14,5 @@ def _examples() -> None:
     """Reproduce published examples."""
 
 
-reproduce.command("paper")(paper_command)
-reproduce.command("fsm")(steering_mirror_command)
+reproduce.command("paper", cls=Command)(paper_command)
+reproduce.command("fsm", cls=Command)(steering_mirror_command)

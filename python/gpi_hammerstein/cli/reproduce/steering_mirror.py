@@ -16,10 +16,10 @@ from gpi_hammerstein.cli.output import (
     escape,
     picture,
     print_json,
-    progress_bar,
     say_written,
     write_json,
 )
+from gpi_hammerstein.cli.progress import progress_bar
 from gpi_hammerstein.explanation import in_words, to_dict
 from gpi_hammerstein.reproduce.steering_mirror import (
     HELD_OUT,
@@ -52,6 +52,7 @@ def steering_mirror_command(
         int, typer.Option(min=1, max=HELD_OUT, help="Number of realisations that are used for the fit.")
     ] = HELD_OUT,
     out: options.Out = None,
+    log: options.Log = False,
     as_json: options.Json = False,
 ) -> None:
     """Find the effects that the model of a fast steering mirror lacks, and compare with published models.
@@ -62,7 +63,7 @@ def steering_mirror_command(
     """
     chosen = options.parse_numbers("levels", levels)
     fitted = [int(level) for level in np.atleast_1d(np.asarray(chosen))]
-    with progress_bar() as progress:
+    with progress_bar(log=log) as progress:
         mirror = steering_mirror(
             data, fitted=fitted, order=order, realisations=realisations, progress=progress
         )

@@ -31,6 +31,7 @@ use crate::effects::{Block, Effect, FreeOrder, Signature};
 use crate::fit::line_modes::line_modes;
 use crate::fit::memory::Memory;
 use crate::fit::minimize::Fitted;
+use crate::progress::as_trial;
 use crate::{Error, Progress};
 
 /// The answer for a trial.
@@ -52,7 +53,9 @@ pub(super) fn examine(
         return Ok(Examination { refusal: None, without: None });
     };
     // what is refused may have shown the way to a better model without it
-    let (without, _) = fitted(state, trial.point.without_effect(place), trial.entry, progress)?;
+    let (without, _) = as_trial(progress, ("examination", trial.entry.name), (0, 1), |progress| {
+        fitted(state, trial.point.without_effect(place), trial.entry, progress)
+    })?;
     let cost = without.linearization.cost;
     let refusal = if !is_possible(&trial.point.effects[place]) {
         Some(Refusal::Impossible)

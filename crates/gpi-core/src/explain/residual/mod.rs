@@ -78,7 +78,7 @@ pub struct ResidualOptions {
 /// };
 /// let record = Record::new(vec![run], 1e3, u, y, vec![])?;
 /// let options = ResidualOptions::default();
-/// let tests = residual_tests(&model, &record, &options, &mut |_, _| true)?;
+/// let tests = residual_tests(&model, &record, &options, &mut |_| true)?;
 /// assert!(tests.iter().any(|test| test.name == "lines" && !test.passed()));
 /// # Ok(())
 /// # }

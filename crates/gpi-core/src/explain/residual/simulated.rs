@@ -55,7 +55,7 @@ fn recorded(residual: &[f64]) -> Record {
 
 fn tested(residual: &[f64]) -> Vec<ResidualTest> {
     let (record, options) = (recorded(residual), ResidualOptions::default());
-    residual_tests(&model(), &record, &options, &mut |_, _| true).unwrap()
+    residual_tests(&model(), &record, &options, &mut |_| true).unwrap()
 }
 
 fn failed(residual: &[f64]) -> Vec<&'static str> {
@@ -144,7 +144,7 @@ fn small_correlations_of_a_long_record_pass_without_a_p_value() {
     };
     let of = |samples: usize| {
         let options = ResidualOptions::default();
-        let tests = residual_tests(&model(), &record(samples), &options, &mut |_, _| true).unwrap();
+        let tests = residual_tests(&model(), &record(samples), &options, &mut |_| true).unwrap();
         tests.into_iter().find(|test| test.name == WHITENESS).unwrap()
     };
     let (short, long) = (of(SAMPLES), of(longer.len()));
@@ -210,7 +210,7 @@ fn a_line_is_found_in_short_runs() {
         record.held_out = (1..10).map(|i| 400 * i..400 * i + 60).collect();
         let record = recorded(&residual).with_experiments(vec![record]).unwrap();
         let options = ResidualOptions::default();
-        let tests = residual_tests(&model(), &record, &options, &mut |_, _| true).unwrap();
+        let tests = residual_tests(&model(), &record, &options, &mut |_| true).unwrap();
         assert!(tests.iter().any(|t| t.name == "lines" && !t.passed()), "{frequency}");
     }
 }
@@ -274,6 +274,6 @@ fn another_rate_is_refused() {
     let (u, y) = (model.inputs().to_vec(), model.outputs().to_vec());
     let record = Record::new(vec![run], 500.0, u, y, vec![]).unwrap();
     let options = ResidualOptions::default();
-    let error = residual_tests(&model, &record, &options, &mut |_, _| true).unwrap_err();
+    let error = residual_tests(&model, &record, &options, &mut |_| true).unwrap_err();
     assert!(error.to_string().contains("500") && error.to_string().contains("1000"), "{error}");
 }
