@@ -1,4 +1,4 @@
-"""Kills a write before every line of the package's writing functions, in one of several situations.
+"""Kills a write before every line of the package's writing functions, in several situations at once.
 
 It is a program, which the tests run, because only a process without other threads may be forked.
 """
@@ -7,6 +7,7 @@ import os
 import shutil
 import sys
 import tempfile
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 
@@ -99,7 +100,25 @@ def single(stride: int) -> int:
         return kills
 
 
-if __name__ == "__main__":
+def main(stride: int, situations: list[str]) -> int:
+    """Try all situations at once, each in a process forked from this one, which has imported the package."""
     kill_writes.FILES = 3
-    how, every = sys.argv[1], int(sys.argv[2])
-    print(single(every) if how == "single" else folder(how, every))
+    children = []
+    for name in situations:
+        child = os.fork()
+        if child == 0:
+            code = 1
+            try:
+                print(name, single(stride) if name == "single" else folder(name, stride), flush=True)
+                code = 0
+            except BaseException:
+                traceback.print_exc()
+            finally:
+                sys.stderr.flush()
+                os._exit(code)
+        children.append(child)
+    return max(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 0 for child in children)
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]), sys.argv[2:]))
