@@ -19,7 +19,7 @@ heading = @printf '\n== %s ==\n' '$(1)'
 .DEFAULT_GOAL := help
 # `make test` always runs its checks in the same order, also with `make -j`.
 .NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam kill-writes fuzz-readers fuzz-models miri reliability clean FORCE
+.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers bench-scale docs figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam kill-writes fuzz-readers fuzz-models miri reliability clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -80,6 +80,9 @@ bench: ## Run the benchmarks
 bench-peers: $(NATIVE) ## Compare the run time with other tools and write docs/benchmarks.md
 	$(BIN)/python -m pip install --quiet --group peers
 	$(BIN)/python tools/bench_peers.py --markdown docs/benchmarks.md
+
+bench-scale: $(NATIVE) ## Print the time of identification as records and their experiments grow
+	$(BIN)/python tools/bench_scale.py
 
 figures: $(NATIVE) ## Print the figures of README (needs the measured data)
 	$(BIN)/python tools/measured_figures.py

@@ -1,7 +1,8 @@
 """Print how long `identify` takes as records and the number of their experiments grow.
 
-The record is that of a simulated stage (`python/tests/plants.py`). It is cut into experiments of equal length, each of which
-begins in motion, so that each has an initial state of its own. `python tools/bench_scale.py --help` lists the options.
+The record is that of a simulated stage (`python/tests/plants.py`). It is cut into experiments of equal
+length, each of which begins in motion, so that each has an initial state of its own. `python
+tools/bench_scale.py --help` lists the options.
 """
 
 import argparse
