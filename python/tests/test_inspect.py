@@ -1,6 +1,7 @@
 """`gpi inspect`: what is said of records whose properties are known."""
 
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ import gpi_hammerstein as gpi
 from data_folder import DATA
 from gpi_hammerstein.cli import run
 from gpi_hammerstein.inspection.columns import resolution
+from gpi_hammerstein.inspection.command import experiment
 from gpi_hammerstein.inspection.excitation import excitation
+from gpi_hammerstein.inspection.identifiable import Answer
 from records import Array, actuator, good_columns, write_csv
 
 RATE = 1000.0
@@ -35,6 +38,21 @@ def test_a_sine_determines_little() -> None:
     assert found.inputs[0]["period_s"] == pytest.approx(0.5)
     assert found.inputs[0]["largest_swing"] == pytest.approx(10.0, rel=1e-3)
     assert found.next_experiment is not None and found.next_experiment["command"].startswith("gpi excite ")
+
+
+@pytest.mark.parametrize("kind", ["triangle", "multisine", "steps"])
+def test_the_next_experiment_can_be_typed_as_it_stands(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    u = np.linspace(-2.5, 7.5, 400)
+    answer = Answer("hysteresis", "no", "", kind)
+    proposed = experiment([answer], excitation([u], RATE), RATE, "V")
+    assert proposed is not None
+    name, *arguments = shlex.split(proposed["command"])
+    assert name == "gpi" and run(arguments) == 0
+    made = np.loadtxt("next.csv", delimiter=",", skiprows=1)[:, -1]
+    assert made.min() >= -2.5 - 1e-9 and made.max() <= 7.5 + 1e-9
 
 
 def test_a_rich_record_determines_much() -> None:

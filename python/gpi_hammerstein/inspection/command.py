@@ -73,7 +73,7 @@ def experiment(answers: Sequence[Answer], found: Excitation, rate: float, unit: 
     >>> from gpi_hammerstein.inspection.excitation import Excitation
     >>> once = Excitation(0.0, 10.0, (1.0, 1.0), 1, 10.0, 1, 1.0, 0.0, None)
     >>> experiment([Answer("hysteresis", "no", "", "triangle")], once, 1000.0, "V")["command"]
-    'gpi excite triangle --rate 1000 --duration 60 --frequency 0.3333 --range 0 10 --unit V -o next.csv'
+    'gpi excite triangle --rate 1000 --duration 60 --frequency 0.3333 --range 0,10 --unit V -o next.csv'
     """
     missing = [answer for answer in answers if answer.experiment and answer.possible != "yes"]
     if not missing:
@@ -85,9 +85,9 @@ def experiment(answers: Sequence[Answer], found: Excitation, rate: float, unit: 
     if kind == "triangle":
         words += ["--frequency", f"{PERIODS / seconds:.4g}"]
     if kind == "multisine":
-        words += ["--band", f"{2 / seconds:.4g}", f"{TOP * 0.5 * rate:.4g}"]
+        words += ["--band", f"{2 / seconds:.4g},{TOP * 0.5 * rate:.4g}"]
     low, high = (found.low, found.high) if found.span() > 0 else (0.0, 1.0)
-    words += ["--range", f"{low:.4g}", f"{high:.4g}"]
+    words += ["--range", f"{low:.4g},{high:.4g}"]
     if unit.isalnum():
         words += ["--unit", unit]
     same = [answer.what for answer in missing if answer.experiment == kind]
