@@ -62,10 +62,11 @@ class Errors:
 
     def __init__(self, found: Explanation) -> None:
         self.record: Record = raise_warmup(found.record, found.warmups)
-        self.before, self.after = found.residuals_before, found.residuals_after
-        self.held_out = found.held_out
-        self.warmups = self.record.warmup
-        self.names = self.record.output_names
+        self.before: list[Array] = found.residuals_before
+        self.after: list[Array] = found.residuals_after
+        self.held_out: list[list[tuple[int, int]]] = found.held_out
+        self.warmups: list[int] = self.record.warmup
+        self.names: list[str] = self.record.output_names
         self._wrong: dict[tuple[int, int], list[int]] = {}
         for row in found.wrong_samples:
             place = row["experiment"], self.names.index(row["output"])
