@@ -126,7 +126,7 @@ def kill_command(kills: int, seed: int) -> Count:
         def arguments(skip: int) -> list[str]:
             # The skipped time is stored in validation.json and changes the pictures.
             words = ["validate", str(model), str(record), "--skip", f"{skip / 1000}", "-o", str(out)]
-            return [sys.executable, "-c", "from gpi_hammerstein.cli import main; main()", *words]
+            return [sys.executable, "-c", "from gpi_hammerstein_launcher import main; main()", *words]
 
         began = time.monotonic()
         quiet(arguments(1))

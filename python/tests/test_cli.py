@@ -365,7 +365,7 @@ def test_summaries_are_printed_without_json(
 
 
 def test_the_process_leaves_with_the_code() -> None:
-    command = [sys.executable, "-c", "from gpi_hammerstein.cli import main; main()"]
+    command = [sys.executable, "-c", "from gpi_hammerstein_launcher import main; main()"]
     help_ = subprocess.run([*command, "--help"], capture_output=True, text=True)
     assert help_.returncode == 0
     for name in ("demo", "identify", "simulate", "validate", "excite", "reproduce"):

@@ -87,7 +87,7 @@ def run(package, *command):
 
 def gpi(package, *arguments):
     """What the command line prints."""
-    return run(package, "-c", "from gpi_hammerstein.cli import main; main()", *arguments)
+    return run(package, "-c", "from gpi_hammerstein_launcher import main; main()", *arguments)
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ import gpi_hammerstein as gpi
 from gpi_hammerstein.cli import run
 from records import RATE, actuator, drive, good_columns, write_csv
 
-GPI = [sys.executable, "-c", "from gpi_hammerstein.cli import main; main()"]
+GPI = [sys.executable, "-c", "from gpi_hammerstein_launcher import main; main()"]
 
 
 @pytest.fixture(scope="module")

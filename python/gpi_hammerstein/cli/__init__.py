@@ -117,10 +117,3 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if type(error).__name__ != "PanicException":
             raise
         return complain(f"a bug in the native module: {error}", FAILED)
-
-
-def main() -> None:
-    """Run the command `gpi` and exit with its exit code."""
-    from gpi_hammerstein_launcher import main as launch
-
-    launch()

@@ -3,18 +3,15 @@
 The rules follow from the model and need no fit:
 
 - A play of half-width r moves its output only if a swing of the input is longer than 2 r. Half-widths up to
-half
-  the largest swing are determined; swings between the same two levels determine one loop only, because every
-  combination of plays with this loop is equal there.
+  half the largest swing are determined. Swings between the same two levels determine one loop only, because
+  every combination of plays with this loop is equal there.
 - A linear system of order n has 2 n parameters, and needs as large an order of persistent excitation. It is
   determined where the input has power, and a sampled response shows nothing above half the sampling rate.
-- A slow lag with the time constant T has reached 63 % of its response after T: a record of the duration D
-shows
-  time constants up to about D / 3, and the fastest lag that is not part of the linear dynamics takes some
+- A slow lag with the time constant T has reached 63 % of its response after T. A record of the duration D
+  shows time constants up to about D / 3. The fastest lag that is not part of the linear dynamics takes some
   samples.
 - An effect of the speed of the input needs equal swings at several speeds, and an effect of its amplitude
-needs
-  several amplitudes: otherwise it is the same as another curve.
+  needs several amplitudes. Otherwise it is the same as another curve.
 """
 
 from dataclasses import dataclass

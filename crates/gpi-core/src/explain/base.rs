@@ -28,7 +28,7 @@ use crate::chain::table::{Group, Table};
 use crate::effects::Situation;
 use crate::fit::problem::Estimation;
 use crate::optimize::{LeastSquares, Linearization, Loss};
-use crate::uncertainty::covariance::descending_eigen;
+use crate::uncertainty::eigen::descending_eigen;
 use crate::{Error, Matrix, Record};
 
 /// A fitted point with its signals and its sensitivities' Gram matrix, ready to test candidates.

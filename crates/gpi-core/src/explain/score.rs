@@ -30,7 +30,7 @@ use super::projection::Projection;
 use crate::chain::free_run::Signals;
 use crate::effects::{Effect, Place, Proposal};
 use crate::parallel::install;
-use crate::uncertainty::covariance::descending_eigen;
+use crate::uncertainty::eigen::descending_eigen;
 use crate::{Error, Experiment, Matrix};
 use nalgebra::DVector;
 use rayon::prelude::*;

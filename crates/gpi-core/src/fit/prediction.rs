@@ -4,7 +4,7 @@ use super::misfit::Misfit;
 use super::refinement::Refinement;
 use crate::chain::point::Point;
 use crate::uncertainty::Prediction;
-use crate::uncertainty::covariance::descending_eigen;
+use crate::uncertainty::eigen::descending_eigen;
 use crate::{Error, Matrix, Model, Record};
 
 /// Axes shorter than this part of the longest are left out: the numbers of an axis are stored with 24 bits.

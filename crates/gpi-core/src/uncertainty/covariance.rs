@@ -25,14 +25,12 @@
 //! over the experiments F has, for the own unknowns, the rows `G_e F` and one more column for each of their places, with the
 //! entries `sqrt(W_e,kk / E)` for E experiments: what each experiment adds to a mean over all of them.
 
-use super::elimination::{Eliminated, Elimination};
+use super::eigen::descending_eigen;
+use super::elimination::{Direction, Eliminated, Elimination};
 use super::settings::CovarianceSettings;
-use crate::linear::{Arrow, ArrowGroup, symmetric_eigen};
+use crate::linear::{Arrow, ArrowGroup};
 use crate::{Error, Matrix};
 use nalgebra::DVector;
-
-/// Shares of unknowns in a direction, of unit length after scaling every unknown by its column's norm.
-pub(crate) type Direction = Vec<(usize, f64)>;
 
 /// Covariance of the unknowns of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -254,20 +252,80 @@ impl Own {
     }
 }
 
-/// Eigenvalues (descending) and eigenvectors of a symmetric matrix.
-pub(crate) fn descending_eigen(matrix: Matrix) -> (DVector<f64>, Matrix) {
-    let n = matrix.nrows();
-    if n == 0 {
-        return (DVector::zeros(0), matrix);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three shared unknowns, two of each of three experiments, with a gram and a score of unequal noise.
+    fn arrows() -> (Arrow, Arrow) {
+        let own = vec![vec![3, 4], vec![5, 6], vec![7, 8]];
+        let (mut gram, mut scores) = (Arrow::zeros(9, own.clone()), Arrow::zeros(9, own.clone()));
+        for (number, own) in own.iter().enumerate() {
+            let places = [&[0, 1, 2], &own[..]].concat();
+            let rows = Matrix::from_fn(12, 5, |i, j| {
+                ((i * (j + 2) + 5 * number) as f64 * 0.61).sin() + 0.2
+            });
+            gram.add_part(&rows.tr_mul(&rows), &places);
+            let louder = Matrix::from_fn(12, 5, |i, j| rows[(i, j)] * (0.5 + 0.1 * i as f64));
+            scores.add_part(&louder.tr_mul(&louder), &places);
+        }
+        (gram, scores)
     }
-    if n > CovarianceSettings::default().large
-        && let Ok(found) = symmetric_eigen(&matrix)
-    {
-        return found;
+
+    #[test]
+    fn covariance_and_trace_are_those_of_the_dense_matrices() {
+        let (gram, scores) = arrows();
+        let all: Vec<usize> = (0..9).collect();
+        let settings = CovarianceSettings::default();
+        let found = Uncertainty::new(settings, &gram, &scores, &all, 1.0, 1.0);
+        let inverse = gram.to_dense().try_inverse().unwrap();
+        let expected = &inverse * scores.to_dense() * &inverse;
+        assert!((found.covariance(&all) - &expected).amax() < 1e-11 * expected.amax());
+        let deviations = expected.diagonal().map(f64::sqrt);
+        assert!((found.deviations() - deviations).amax() < 1e-11);
+        assert!((found.used - (inverse * scores.to_dense()).trace()).abs() < 1e-11);
+        assert_eq!((found.open.len(), found.estimated), (0, 9));
     }
-    let eigen = matrix.symmetric_eigen();
-    let mut order: Vec<usize> = (0..n).collect();
-    order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
-    let values = DVector::from_fn(n, |i, _| eigen.eigenvalues[order[i]]);
-    (values, eigen.eigenvectors.select_columns(&order))
+
+    #[test]
+    fn held_unknowns_have_no_variance() {
+        let (gram, scores) = arrows();
+        let free = [0, 2, 3, 5, 6, 8];
+        let settings = CovarianceSettings::default();
+        let found = Uncertainty::new(settings, &gram, &scores, &free, 1.0, 1.0);
+        let inverse = gram.select(&free).try_inverse().unwrap();
+        let expected = &inverse * scores.select(&free) * &inverse;
+        assert!((found.covariance(&free) - expected).amax() < 1e-11);
+        assert_eq!(found.covariance(&[1, 4, 7]), Matrix::zeros(3, 3));
+    }
+
+    #[test]
+    fn directions_without_data_are_open() {
+        let (mut gram, scores) = arrows();
+        // shared 0 repeats shared 1, and the own unknowns of the second experiment each other
+        let copy = |mut matrix: Matrix, of: usize, to: usize| {
+            let column = matrix.column(of).into_owned();
+            matrix.set_column(to, &column);
+            let row = matrix.row(of).into_owned();
+            matrix.set_row(to, &row);
+            matrix
+        };
+        let dense = copy(copy(gram.to_dense(), 1, 0), 5, 6);
+        gram = Arrow::zeros(9, vec![vec![3, 4], vec![5, 6], vec![7, 8]]);
+        for own in [[3, 4], [5, 6], [7, 8]] {
+            // the shared part once
+            let places = [&[0, 1, 2], &own[..]].concat();
+            let part = Matrix::from_fn(5, 5, |i, j| {
+                let value = dense[(places[i], places[j])];
+                if i < 3 && j < 3 && own[0] > 3 { 0.0 } else { value }
+            });
+            gram.add_part(&part, &places);
+        }
+        let all: Vec<usize> = (0..9).collect();
+        let settings = CovarianceSettings::default();
+        let found = Uncertainty::new(settings, &gram, &scores, &all, 1.0, 1.0);
+        assert_eq!(found.open.len(), 2);
+        let open = found.deviations().map(f64::is_nan);
+        assert_eq!(open.as_slice(), [true, true, false, false, false, true, true, false, false]);
+    }
 }

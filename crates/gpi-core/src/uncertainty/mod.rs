@@ -2,6 +2,7 @@
 
 mod bands;
 pub(crate) mod covariance;
+pub(crate) mod eigen;
 mod elimination;
 pub(crate) mod noise_floor;
 pub(crate) mod noise_model;
