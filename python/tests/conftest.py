@@ -1,9 +1,19 @@
 """Shared by all tests: property tests repeat themselves in CI and explore elsewhere."""
 
 import os
+from collections.abc import Iterator
 
+import matplotlib.pyplot as plt
+import pytest
 from hypothesis import settings
 
 settings.register_profile("explore", deadline=None, max_examples=100)
 settings.register_profile("repeat", deadline=None, max_examples=100, derandomize=True)
 settings.load_profile("repeat" if os.environ.get("CI") else "explore")
+
+
+@pytest.fixture(autouse=True)
+def no_open_figures() -> Iterator[None]:
+    """Close the figures of a test: pyplot keeps them, and tests of the same process count them."""
+    yield
+    plt.close("all")
