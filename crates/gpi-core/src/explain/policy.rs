@@ -294,11 +294,12 @@ settings! {
         run: usize = 3, FROM_ONE;
         moved: f64 = 0.01, PART;
         crowded: f64 = 5.0, FROM_ONE;
-        /// Past inputs and past outputs that predict the next input.
-        past_inputs: usize = 20, FROM_ONE;
+        /// Past inputs and past outputs that predict the next input. The inputs' past is long, so that modes that ring
+        /// know nothing older.
+        past_inputs: usize = 160, FROM_ONE;
         past_outputs: usize = 10, FROM_ONE;
         /// Part of the squares that past outputs must take, and its standard errors. On records of known truth a stage
-        /// under feedback has 0.47 and 30, and fifty others at most 0.04 or at most 5.
+        /// under feedback has 0.47 and 21, and fifty others at most 0.06 or at most 5.
         predicted: f64 = 0.1, PART;
         sure: f64 = 5.0, 0.0..=100.0;
         /// Mean square of what the input's past leaves of its step, in half spans: less is rounding of a smooth input.
