@@ -40,10 +40,10 @@ def test_it_identifies_and_simulates():
 
 
 def test_it_goes_into_pipelines_and_searches():
-    X = U[:, None]
+    X, y = U[:2000, None], Y[:2000]
     split = TimeSeriesSplit(2)
     pipeline = make_pipeline(StandardScaler(), GpiRegressor(rate=RATE, half_widths=4, thresholds=0))
-    assert min(cross_val_score(pipeline, X, Y, cv=split)) > 0.99
+    assert min(cross_val_score(pipeline, X, y, cv=split)) > 0.99
     choices = {"order": [1, 2]}
     search = GridSearchCV(GpiRegressor(rate=RATE, half_widths=4, thresholds=0), choices, cv=split)
-    assert search.fit(X, Y).best_score_ > 0.99
+    assert search.fit(X, y).best_score_ > 0.99

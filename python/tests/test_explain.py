@@ -180,6 +180,7 @@ def bouc_wen(u, rate):
     return scipy.signal.lfilter(*mode, v - v[0]) + v[0]
 
 
+@pytest.mark.slow
 def test_a_mode_is_kept_where_slow_poles_are_not():
     """Its memory of the path looks like slow poles; without them a lower order would drop the mode first."""
     rate, t = 2000.0, np.arange(20_000) / 2000.0

@@ -12,6 +12,9 @@ import oracle
 from gpi_hammerstein.explanation import in_words, to_dict
 from records import RATE, model_of
 
+# One process, so that what they share is made once.
+pytestmark = pytest.mark.xdist_group("inner loops")
+
 SAMPLES = 500
 NOISE = 2e-3
 WIDTHS, WEIGHTS = [0.2, 0.5, 1.1], [0.4, -0.3, 1.0]
@@ -238,7 +241,7 @@ def multisine(samples: int, seed: int) -> np.ndarray:
     return np.vstack([np.zeros((12, 2)), u])
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def explained() -> gpi.Explanation:
     """What a plant with stops around G lacks, driven at three swings."""
     drives = [-0.06, 0.05, 0.01]

@@ -116,7 +116,9 @@ def test_throttle_is_read_the_same_from_both_files() -> None:
     np.testing.assert_allclose(csv.y[0], mat.y[0], rtol=1e-6, atol=1e-6)
 
 
-@pytest.mark.parametrize("number", [0, 14, 17])
+@pytest.mark.parametrize(
+    "number", [0, *(pytest.param(number, marks=pytest.mark.slow) for number in (14, 17))]
+)
 def test_records_without_undeclared_effect_come_near_their_noise(
     number: int, capsys: pytest.CaptureFixture[str]
 ) -> None:

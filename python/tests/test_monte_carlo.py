@@ -8,6 +8,9 @@ import scipy.stats
 
 import trials
 
+# One process, so that what they share is made once.
+pytestmark = pytest.mark.xdist_group("monte carlo")
+
 RUNS = 300
 CHANCE = 1e-4  # that a correct estimator fails one of these tests under another seed
 

@@ -21,12 +21,15 @@ from gpi_hammerstein.report.curves import classes
 from gpi_hammerstein.report.quality import facts
 from records import RATE, actuator, drive, good_columns, write_csv
 
+# One process, so that what they share is made once.
+pytestmark = pytest.mark.xdist_group("report")
+
 # One loop of the record and one of the model, and three pictures of the linear part.
 PICTURES = 5
 VENDOR = files("gpi_hammerstein.report") / "vendor"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def found():
     u = drive()
     y = actuator(u) + 0.05 * np.sin(2 * np.pi * 50.3 * np.arange(len(u)) / RATE)
@@ -42,7 +45,7 @@ def found():
 COMMAND = {"command": "gpi report 'a<b>.csv'", "notes": ["resampled & cut"], "model_file": "my model.json"}
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def page(found):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")

@@ -14,7 +14,8 @@ from browser import complaints, needs_browser, opened
 from gpi_hammerstein.report import report_html
 from gpi_hammerstein.report.series import DATA_BYTES, Errors, parts
 
-pytestmark = needs_browser
+# One process, so that the page is made once.
+pytestmark = [needs_browser, pytest.mark.xdist_group("report browser")]
 
 RATE = 1000.0
 LARGEST_PAGE = 2_000_000
@@ -44,12 +45,12 @@ def explained(lengths, outputs=2):
     return gpi.explain(record, order=1, half_widths=[0.0, 1.0], effects=[])
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def found():
     return explained([3000, 4000])
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def file(found, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "report.html"
     found.report(path)

@@ -23,7 +23,7 @@ REFERENCE = {
 }
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def found() -> Paper:
     return paper()
 
@@ -63,6 +63,7 @@ def test_the_refinement_removes_the_bias(name: str, found: Paper) -> None:
         assert np.isnan(reading.refined.weights_error)
 
 
+@pytest.mark.xdist_group("paper")
 def test_the_command_prints_and_draws_it(
     found: Paper, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -103,6 +104,7 @@ def test_a_file_that_is_not_the_published_one_is_not_kept(tmp_path: Path) -> Non
 
 
 @needs_measured
+@pytest.mark.slow
 def test_the_steering_mirror_lacks_stiffness(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     options = ["--order", "12", "--realisations", "1", "--data", str(MEASURED / NAME)]

@@ -32,7 +32,9 @@ def names(run, change=lambda signal: signal):
     [pytest.param(one, marks=[pytest.mark.slow] if index != 1 else []) for index, one in enumerate(CASES)],
     ids="+".join,
 )
-@pytest.mark.parametrize("motion", [False, True], ids=["rest", "motion"])
+@pytest.mark.parametrize(
+    "motion", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["rest", "motion"]
+)
 def test_names_survive_rounding(effects, motion):
     plant = plants.draw(31, effects, 6.0, SECONDS, RATE)
     plant.in_motion = motion
