@@ -16,6 +16,7 @@ mod another_record;
 mod bridge;
 mod certainty;
 pub(crate) mod dense;
+pub(crate) mod excerpt;
 mod finish;
 pub(crate) mod gather;
 mod grid;

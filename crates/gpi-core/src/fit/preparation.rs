@@ -79,7 +79,10 @@ impl<'a> Prepared<'a> {
             match forgets {
                 Some(at) if (at as f64) < fraction * experiment.input.nrows() as f64 => {
                     experiment.warmup = at;
-                    experiment.held_out.retain(|held| held.start >= at);
+                    for held in &mut experiment.held_out {
+                        held.start = held.start.max(at);
+                    }
+                    experiment.held_out.retain(|held| !held.is_empty());
                     notes.push(format!(
                         "experiment {index} has an unknown initial state: its first {at} samples, in which \
                          the plays depend on it, are not scored"

@@ -24,6 +24,8 @@ pub(crate) struct FitSettings {
     /// How long the memory of a stage's dynamics may be; a search uses the defaults.
     pub memory: MemorySettings,
     pub line_modes: LineModeSettings,
+    /// The stretches of a long record on which structures are compared.
+    pub excerpt: ExcerptSettings,
 }
 
 impl FitSettings {
@@ -41,7 +43,8 @@ impl FitSettings {
         self.initial_state.validate()?;
         self.representatives.validate()?;
         self.memory.validate()?;
-        self.line_modes.validate()
+        self.line_modes.validate()?;
+        self.excerpt.validate()
     }
 }
 
@@ -143,6 +146,20 @@ settings! {
         most: f64 = 0.5, PART;
         /// Part to which the slowest pole must have decayed before the scored part: one percent.
         decayed: f64 = 0.01, f64::MIN_POSITIVE..=1.0;
+    }
+
+    /// The stretches of a long record on which structures are compared.
+    struct ExcerptSettings {
+        /// Scored samples from which on a record is long, and those of its stretches together. By hand: all parameters of
+        /// a stage are determined by far fewer, and comparing on so many takes seconds.
+        long: usize = 200_000, FROM_ONE;
+        samples: usize = 40_000, FROM_ONE;
+        /// Samples of a stretch at least: its unknown initial state is few unknowns beside them. By hand.
+        shortest: usize = 4000, FROM_ONE;
+        /// Swings that a stretch has, so that the plays lose their unknown initial state in a twentieth of it, and those
+        /// without which it shows no loops. By hand.
+        swings: f64 = 20.0, POSITIVE;
+        fewest_swings: f64 = 4.0, 0.0..=1e6;
     }
 
     /// How long the memory of a stage's dynamics may be.

@@ -9,19 +9,23 @@
 //!    one so far; `criterion` compares them by a BIC for autocorrelated residuals.
 //! 4. The best one is simplified, and its uncertainty is computed.
 //!
+//! Of a long record, steps 2 and 3 see stretches only, see [`excerpt`].
+//!
 //! Source of 1 to 2: K. F. Aljanaideh et al., whose chain starts with u -> y and inverts G to see v; here v is the
 //! hysteresis' own output, so that no noise is run through an inverse.
 
 use crate::chain::bounds::range;
 use crate::chain::hysteresis::Parameters;
+use crate::chain::point::Point;
 use crate::fit::Grid;
-use crate::fit::joint::Refined;
+use crate::fit::excerpt::excerpt;
+use crate::fit::joint::{Refined, joint};
 use crate::fit::preparation::Prepared;
 use crate::identify::alternation::{self, Taps};
 use crate::identify::identification::{Candidate, Identification, IdentifyOptions, Round};
 use crate::identify::quasi_static;
 use crate::identify::settings::{AlternationPolicy, IdentifySettings, TapPolicy};
-use crate::identify::structure::StructureSearch;
+use crate::identify::structure::{StructureSearch, refine_options};
 use crate::linear::{Fir, excitation_limit};
 use crate::progress::{Overall, Progress, ProgressSettings, Report, report};
 use crate::{Error, Record};
@@ -71,7 +75,53 @@ pub(crate) fn prepare<'a>(
 }
 
 /// Seeds and compares structures; `fast` rules slow poles out, and leaves the dense grid out.
+///
+/// Those of a long record are compared on stretches of it, and the best one is fitted to all of it.
 pub(crate) fn compare(
+    prepared: &mut Prepared,
+    options: &IdentifyOptions,
+    fast: bool,
+    progress: Progress,
+) -> Result<Compared, Error> {
+    let Some(stretches) = excerpt(prepared.given, &prepared.settings.excerpt)? else {
+        return compare_on_all(prepared, options, fast, progress);
+    };
+    let mut part = prepare(&stretches, options)?;
+    let compared = compare_on_all(&mut part, options, fast, progress);
+    // stretches that show too little, such as an impulse response of rank 0, leave the whole record to try
+    let Ok(mut compared) = Error::unless_interrupted(compared)? else {
+        return compare_on_all(prepared, options, fast, progress);
+    };
+    let point = carried(&compared.refined.fitted.point, &part, prepared);
+    let refine = refine_options(options);
+    compared.refined = joint(point, prepared, &refine, f64::INFINITY, fast, progress)?;
+    prepared.notes.push(format!(
+        "the structures were compared on {} of {} samples, in stretches that are spread over the record; the best one was \
+         then fitted to all samples",
+        stretches.scored(),
+        prepared.record.scored()
+    ));
+    Ok(compared)
+}
+
+/// A point of stretches of a record as one of the whole record, whose initial states are still to be fitted.
+fn carried(point: &Point, part: &Prepared, whole: &Prepared) -> Point {
+    let mut carried = whole.point(point.dynamics.clone());
+    carried.channels.clone_from(&point.channels);
+    whole.settle(&mut carried);
+    let count = point.offsets.len() as f64;
+    let means = part.means.iter().zip(&whole.means);
+    for (output, (own, other)) in means.enumerate() {
+        let average = point.offsets.iter().map(|offsets| offsets[(0, output)]).sum::<f64>() / count;
+        for offsets in &mut carried.offsets {
+            offsets.column_mut(output).fill(average + own - other);
+        }
+    }
+    carried
+}
+
+/// Seeds and compares structures on all of a prepared record.
+fn compare_on_all(
     prepared: &mut Prepared,
     options: &IdentifyOptions,
     fast: bool,

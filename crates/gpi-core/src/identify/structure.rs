@@ -17,6 +17,17 @@ use crate::progress::Progress;
 use crate::uncertainty::noise_floor::NoiseFloor;
 use crate::{Error, Record};
 
+/// How a structure is refined: what the user gives by value is not moved.
+pub(super) fn refine_options(options: &IdentifyOptions) -> RefineOptions {
+    let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_)));
+    RefineOptions {
+        thresholds: !given(&options.thresholds),
+        half_widths: !given(&options.half_widths),
+        robust: options.robust,
+        offset_knots: options.offset_knots,
+    }
+}
+
 /// Tries structures in series that end where nothing is gained.
 pub(super) struct StructureSearch<'a> {
     comparison: Comparison<'a>,
@@ -25,22 +36,15 @@ pub(super) struct StructureSearch<'a> {
 }
 
 impl<'a> StructureSearch<'a> {
-    /// What the user gives by value is not moved; `fast` rules slow poles out.
+    /// `fast` rules slow poles out.
     pub(super) fn new(
         prepared: &'a Prepared<'a>,
         policy: &'a StructurePolicy,
         options: &IdentifyOptions,
         fast: bool,
     ) -> Self {
-        let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_)));
-        let refine = RefineOptions {
-            thresholds: !given(&options.thresholds),
-            half_widths: !given(&options.half_widths),
-            robust: options.robust,
-            offset_knots: options.offset_knots,
-        };
         Self {
-            comparison: Comparison::new(prepared, policy, refine, fast),
+            comparison: Comparison::new(prepared, policy, refine_options(options), fast),
             half_widths: options.half_widths.clone(),
             thresholds: options.thresholds.clone(),
         }

@@ -65,6 +65,16 @@ impl Experiment {
         Self { covariates, warmup, ..Self::new(rows(&self.input), rows(&self.output)) }
     }
 
+    /// The rows of a range as an experiment of their own, in which the same samples are scored.
+    pub(crate) fn stretch(&self, range: Range<usize>) -> Self {
+        let within = |k: usize| k.clamp(range.start, range.end) - range.start;
+        let mut stretch = self.rows(range.clone(), within(self.warmup));
+        stretch.held_out =
+            self.held_out.iter().map(|held| within(held.start)..within(held.end)).collect();
+        stretch.held_out.retain(|held| !held.is_empty());
+        stretch
+    }
+
     /// The same experiment in which only one of `parts` parts of the scored samples is scored; the parts differ in size
     /// by at most one sample.
     pub(crate) fn part(&self, number: usize, parts: usize) -> Self {
