@@ -29,6 +29,16 @@ pub(crate) struct FitSettings {
 }
 
 impl FitSettings {
+    /// Those for fits to a whole record that is long.
+    pub(crate) fn of_long_record(mut self) -> Self {
+        let ExcerptSettings { steps, gain, .. } = self.excerpt;
+        (self.joint.most_steps, self.joint.fewest_steps) =
+            (steps, steps.min(self.joint.fewest_steps));
+        (self.joint.least_gain, self.joint.largest_gain) =
+            (gain, gain.max(self.joint.largest_gain));
+        self
+    }
+
     /// Refuses settings that mean nothing.
     pub(crate) fn validate(&self) -> Result<(), Error> {
         self.preparation.validate()?;
@@ -160,6 +170,10 @@ settings! {
         /// without which it shows no loops. By hand.
         swings: f64 = 20.0, POSITIVE;
         fewest_swings: f64 = 4.0, 0.0..=1e6;
+        /// Steps of a fit to the whole record at most, and the part of the cost below which a step is the last: further ones
+        /// gain what only so many samples can show, and nobody can use. By hand.
+        steps: usize = 25, FROM_ONE;
+        gain: f64 = 1e-4, PART;
     }
 
     /// How long the memory of a stage's dynamics may be.

@@ -10,7 +10,9 @@
 
 mod alternation;
 mod criterion;
+mod entry;
 mod identification;
+pub(crate) mod long_record;
 pub(crate) mod procedure;
 mod quasi_static;
 mod realization;
@@ -24,5 +26,5 @@ pub use crate::fit::{
 };
 pub use crate::progress::{Progress, Report};
 pub use crate::uncertainty::{Bands, NoiseFloor, NoiseMethod, PoleDeviations, ResponseDeviation};
+pub use entry::identify;
 pub use identification::{Candidate, Identification, IdentifyOptions, Round};
-pub use procedure::identify;

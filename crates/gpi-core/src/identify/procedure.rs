@@ -9,50 +9,24 @@
 //!    one so far; `criterion` compares them by a BIC for autocorrelated residuals.
 //! 4. The best one is simplified, and its uncertainty is computed.
 //!
-//! Of a long record, steps 2 and 3 see stretches only, see [`excerpt`].
+//! Of a long record, steps 2 and 3 see stretches only, see [`long_record`](super::long_record).
 //!
 //! Source of 1 to 2: K. F. Aljanaideh et al., whose chain starts with u -> y and inverts G to see v; here v is the
 //! hysteresis' own output, so that no noise is run through an inverse.
 
 use crate::chain::bounds::range;
 use crate::chain::hysteresis::Parameters;
-use crate::chain::point::Point;
 use crate::fit::Grid;
-use crate::fit::excerpt::excerpt;
-use crate::fit::joint::{Refined, joint};
+use crate::fit::joint::Refined;
 use crate::fit::preparation::Prepared;
 use crate::identify::alternation::{self, Taps};
-use crate::identify::identification::{Candidate, Identification, IdentifyOptions, Round};
+use crate::identify::identification::{Candidate, IdentifyOptions, Round};
 use crate::identify::quasi_static;
-use crate::identify::settings::{AlternationPolicy, IdentifySettings, TapPolicy};
-use crate::identify::structure::{StructureSearch, refine_options};
+use crate::identify::settings::{AlternationPolicy, IdentifySettings};
+use crate::identify::structure::StructureSearch;
 use crate::linear::{Fir, excitation_limit};
-use crate::progress::{Overall, Progress, ProgressSettings, Report, report};
+use crate::progress::{Progress, Report, report};
 use crate::{Error, Record};
-
-/// Identifies a model from a record.
-///
-/// A record whose input has a low order of persistent excitation (a sine, say) supports no dynamics beyond a gain and
-/// a delay; the delay is then the one that fits best. Otherwise G has the order that the information
-/// criterion prefers, and the rounds go on until nothing is gained.
-///
-/// # Errors
-/// A constant input or output, more taps than the order of persistent excitation or the samples allow, parameters out
-/// of range, [`Error::Interrupted`] when `progress` returned false.
-pub fn identify(
-    record: &Record,
-    options: &IdentifyOptions,
-    progress: Progress,
-) -> Result<Identification, Error> {
-    let ProgressSettings { light, structures, identified, last, .. } = ProgressSettings::usual()?;
-    let mut overall = Overall::new(progress, light, identified, structures);
-    let mut prepared = prepare(record, options)?;
-    let found = compare(&mut prepared, options, false, &mut |report| overall.take(report))?;
-    overall.part(1.0, last * light);
-    let found = finish(&prepared, found, &mut |report| overall.take(report))?;
-    overall.finish();
-    Ok(found)
-}
 
 /// The structures that were compared on a prepared record.
 pub(crate) struct Compared {
@@ -60,9 +34,9 @@ pub(crate) struct Compared {
     pub chosen: usize,
     pub refined: Refined,
     pub candidates: Vec<Candidate>,
-    quasi_static: bool,
-    stages: (Option<Fir>, Vec<f64>, usize, Vec<Round>),
-    supported: usize,
+    pub(super) quasi_static: bool,
+    pub(super) stages: (Option<Fir>, Vec<f64>, usize, Vec<Round>),
+    pub(super) supported: usize,
 }
 
 /// Makes a record ready, on the given or usual grids.
@@ -75,53 +49,7 @@ pub(crate) fn prepare<'a>(
 }
 
 /// Seeds and compares structures; `fast` rules slow poles out, and leaves the dense grid out.
-///
-/// Those of a long record are compared on stretches of it, and the best one is fitted to all of it.
-pub(crate) fn compare(
-    prepared: &mut Prepared,
-    options: &IdentifyOptions,
-    fast: bool,
-    progress: Progress,
-) -> Result<Compared, Error> {
-    let Some(stretches) = excerpt(prepared.given, &prepared.settings.excerpt)? else {
-        return compare_on_all(prepared, options, fast, progress);
-    };
-    let mut part = prepare(&stretches, options)?;
-    let compared = compare_on_all(&mut part, options, fast, progress);
-    // stretches that show too little, such as an impulse response of rank 0, leave the whole record to try
-    let Ok(mut compared) = Error::unless_interrupted(compared)? else {
-        return compare_on_all(prepared, options, fast, progress);
-    };
-    let point = carried(&compared.refined.fitted.point, &part, prepared);
-    let refine = refine_options(options);
-    compared.refined = joint(point, prepared, &refine, f64::INFINITY, fast, progress)?;
-    prepared.notes.push(format!(
-        "the structures were compared on {} of {} samples, in stretches that are spread over the record; the best one was \
-         then fitted to all samples",
-        stretches.scored(),
-        prepared.record.scored()
-    ));
-    Ok(compared)
-}
-
-/// A point of stretches of a record as one of the whole record, whose initial states are still to be fitted.
-fn carried(point: &Point, part: &Prepared, whole: &Prepared) -> Point {
-    let mut carried = whole.point(point.dynamics.clone());
-    carried.channels.clone_from(&point.channels);
-    whole.settle(&mut carried);
-    let count = point.offsets.len() as f64;
-    let means = part.means.iter().zip(&whole.means);
-    for (output, (own, other)) in means.enumerate() {
-        let average = point.offsets.iter().map(|offsets| offsets[(0, output)]).sum::<f64>() / count;
-        for offsets in &mut carried.offsets {
-            offsets.column_mut(output).fill(average + own - other);
-        }
-    }
-    carried
-}
-
-/// Seeds and compares structures on all of a prepared record.
-fn compare_on_all(
+pub(super) fn compare_on_all(
     prepared: &mut Prepared,
     options: &IdentifyOptions,
     fast: bool,
@@ -251,43 +179,4 @@ fn channels(record: &Record, options: &IdentifyOptions) -> Result<Vec<Parameters
         Ok(Parameters::identity(options.reading, zones, plays))
     };
     (0..record.inputs().len()).map(channel).collect()
-}
-
-/// The best structure's model, and the results of the steps that led to it.
-fn finish(
-    prepared: &Prepared,
-    found: Compared,
-    progress: Progress,
-) -> Result<Identification, Error> {
-    let Compared { chosen, mut refined, candidates, quasi_static, stages, supported } = found;
-    let ((fir, singular_values, reflected, rounds), supported_taps) = (stages, supported);
-    refined.drop_undetermined(prepared, progress)?;
-    let refinement = refined.finish(prepared, progress)?;
-    let mut notes = prepared.notes.clone();
-    let dynamics = &refinement.bands.point.dynamics;
-    if quasi_static && supported_taps <= TapPolicy::default().gain_and_delay {
-        let lag = if dynamics.order() > 0 { " and a lag" } else { "" };
-        notes.push(format!(
-            "each input is persistently exciting of order {supported_taps} only, enough for a gain and a delay: the \
-             linear part is a delay of {} samples{lag}",
-            dynamics.delay
-        ));
-    }
-    let point = &refinement.bands.point;
-    let model = point.to_model(prepared.given, &prepared.record, &prepared.means)?;
-    let estimates = refinement.estimates(&model)?;
-    Ok(Identification {
-        model: model.with_estimates(estimates),
-        candidates,
-        chosen,
-        fir,
-        singular_values,
-        reflected,
-        supported_taps,
-        delay: quasi_static.then_some(dynamics.delay),
-        rounds,
-        warmups: prepared.record.experiments().iter().map(|e| e.warmup).collect(),
-        notes,
-        refinement,
-    })
 }
