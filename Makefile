@@ -74,6 +74,9 @@ docs: $(NATIVE) ## Build the documentation in out/site; its tutorial downloads a
 	cargo doc -p gpi-core --no-deps
 	rm -rf out/site/rust && cp -R target/doc out/site/rust
 
+notebooks: $(NATIVE) ## Run the notebooks of the documentation and write their outputs into them (needs the measured data)
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python tools/run_notebooks.py
+
 bench: ## Run the benchmarks
 	cargo bench
 

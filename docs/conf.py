@@ -40,8 +40,8 @@ copybutton_prompt_is_regexp = True
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
-# Every page runs completely; an error stops the build.
-nb_execution_mode = "auto"
+# Every page runs completely, also a notebook that contains outputs; an error stops the build.
+nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_in_temp = True
 nb_execution_timeout = 300

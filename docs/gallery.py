@@ -25,7 +25,9 @@ def thumbnail(section: nodes.section, image: nodes.image) -> nodes.paragraph:
     title = section.next_node(nodes.title).astext()
     small = image.deepcopy()
     small["alt"] = title
-    link = nodes.reference("", "", small, nodes.inline(text=title), internal=True, refuri=f"#{section['ids'][0]}")
+    link = nodes.reference(
+        "", "", small, nodes.inline(text=title), internal=True, refuri=f"#{section['ids'][0]}"
+    )
     return nodes.paragraph("", "", link)
 
 

@@ -22,9 +22,7 @@ def main() -> None:
     """Explain the demo record, and draw the residual over time and its spectrum."""
     with as_file(files("gpi_hammerstein") / "data" / "demo.csv.gz") as record:
         found = gpi.explain(gpi.read_record(record))
-    fig, (left, right) = plt.subplots(
-        1, 2, figsize=(11, 3.6), width_ratios=(3, 2), layout="constrained"
-    )
+    fig, (left, right) = plt.subplots(1, 2, figsize=(11, 3.6), width_ratios=(3, 2), layout="constrained")
     gpi.plot.residual_in_time(found, left).set_title("Error of the model over time (grey: held out)")
     gpi.plot.residual_spectrum(found, right).set_title("Its spectrum")
     PICTURE.parent.mkdir(exist_ok=True)
