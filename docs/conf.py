@@ -27,7 +27,8 @@ exclude_patterns = ["**/.ipynb_checkpoints"]
 
 html_theme = "furo"
 html_title = f"gpi-hammerstein {release}"
-# Formulas are typeset without a network. This file of MathJax needs no other file, also if pages are opened from a disk.
+# Formulas are typeset without a network. This file of MathJax needs no other file, so that it also
+# works if pages are opened from a disk.
 (MATHJAX,) = (file for file in files("sphinx-mathjax-offline") or [] if file.name == "tex-svg.js")
 html_static_path = ["style", str(MATHJAX.locate())]
 html_css_files = ["site.css"]

@@ -1,7 +1,7 @@
 """A Sphinx extension: a container of the class `gallery` gets the pictures of its page as thumbnails.
 
-Each thumbnail links to the section that draws the picture. The pictures are those of the executed page, so that
-the gallery cannot differ from it.
+Each thumbnail links to the section that draws the picture. The pictures are those of the executed page, so
+that the gallery cannot differ from it.
 """
 
 from docutils import nodes

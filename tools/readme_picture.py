@@ -1,4 +1,4 @@
-"""Draw the picture of README: the residual of the demo record before and after the missing effects were added.
+"""Draw the picture of README: the residual of the demo record before and after effects were added.
 
 Run it from the root of the project: `python tools/readme_picture.py`.
 """

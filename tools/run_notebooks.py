@@ -1,6 +1,7 @@
-"""Run the notebooks of the documentation, and write their outputs into the files, so that every viewer shows them.
+"""Run the notebooks of the documentation, and write their outputs into the files.
 
-A notebook contains a digest of the code that made its outputs; a test fails if the code was changed afterwards.
+Every viewer then shows the outputs. A notebook also contains a digest of the code that made them; a test fails
+if the code was changed afterwards.
 The tutorial needs the measured data. Run it from the root of the project: `make notebooks`.
 """
 

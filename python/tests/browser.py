@@ -44,7 +44,10 @@ def opened(
     dark: bool = False,
     network: bool = True,
 ) -> Iterator[Any]:
-    """The driver of a browser that shows a page; its profile is in `folder`. Without a network, no name resolves."""
+    """The driver of a browser that shows a page; its profile is in `folder`.
+
+    Without a network, no name resolves.
+    """
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
