@@ -1,8 +1,8 @@
 """Run the notebooks of the documentation, and write their outputs into the files.
 
-Every viewer then shows the outputs. A notebook also contains a digest of the code that made them. A test fails
-if the code was changed afterwards. The tutorial needs the measured data. Run it from the root of the project:
-`make notebooks`.
+Every viewer then shows the outputs. A notebook also contains a digest of the code that made them. A test
+fails if the code was changed afterwards. The tutorial needs the measured data. Run it from the root of the
+project: `make notebooks`.
 """
 
 import hashlib
