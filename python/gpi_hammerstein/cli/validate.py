@@ -29,8 +29,7 @@ OwnRecord = Annotated[
     bool,
     typer.Option(
         "--own-record",
-        help="The record is the one that the model was fitted to: keep the effects that the input does not "
-        "drive.",
+        help="The record is the one that the model was fitted to: keep the effects that depend only on time.",
     ),
 ]
 
@@ -59,9 +58,9 @@ def validate(
     """Compute the error of a model on a record, and test its residual for structure.
 
     The error is computed in the same way as for a held-out record of identify and explain. The unknown
-    initial state is fitted, and the offset of the model is kept. Effects that the input does not drive
-    (drift, disturbances) are left out, because they are different in every record. Accepts any gpi-model/1
-    file. Writes validation.json and pictures of the residual to DIR.
+    initial state is fitted, and the offset of the model is kept. Effects that depend only on
+    time (drift, disturbances) are left out, because they are different in every record. Accepts any
+    gpi-model/1 file. Writes validation.json and pictures of the residual to DIR.
     """
     model = options.load_model(model_file)
     recording = options.read(
