@@ -22,6 +22,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
     "gallery",
+    "streams",
 ]
 exclude_patterns = ["**/.ipynb_checkpoints"]
 

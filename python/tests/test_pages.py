@@ -1,5 +1,6 @@
 """Documentation pages that run: tutorial, how-to pages, notebooks, and the code of README."""
 
+import importlib
 import os
 import re
 import subprocess
@@ -143,6 +144,15 @@ def test_every_equation_that_is_cited_is_in_the_theory() -> None:
     assert used <= there, f"not in docs/theory.md: {sorted(used - there)}"
     assert len(used) >= 15, "docstrings cite the theory"
     assert {f"`{name}`" for name in gpi.effect_names()} <= set(re.findall(r"`[a-z-]+`", theory))
+
+
+def test_pieces_of_an_output_are_joined_within_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS))
+    joined = importlib.import_module("streams").joined
+    pieces = [("stdout", "Writt"), ("stderr", "a note\n"), ("stdout", "en: model.json\n")]
+    outputs = [nbformat.v4.new_output("stream", name=name, text=text) for name, text in pieces]
+    told = {output["name"]: output["text"] for output in joined(outputs)}
+    assert told == {"stdout": "Written: model.json\n", "stderr": "a note\n"}
 
 
 @pytest.fixture(scope="module")
