@@ -15,7 +15,7 @@ import gpi_hammerstein as gpi  # noqa: E402
 from browser import opened  # noqa: E402
 
 PICTURE = ROOT / "docs" / "images" / "report.png"
-WIDTH, HEIGHT = 1200, 900
+WIDTH, HEIGHT = 1200, 865
 
 
 def main() -> None:

@@ -26,7 +26,7 @@ class Command(TyperCommand):
     def __init__(self, *args: Any, **options: Any) -> None:
         """Create a command; `help` may be the text of a docstring."""
         super().__init__(*args, **options)
-        self.help = unwrapped(self.help)
+        self.help: str | None = unwrapped(self.help)
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters, --help included."""
