@@ -218,8 +218,8 @@ fn finish(
     if quasi_static && supported_taps <= TapPolicy::default().gain_and_delay {
         let lag = if dynamics.order() > 0 { " and a lag" } else { "" };
         notes.push(format!(
-            "each input is persistently exciting of order {supported_taps} only, which determines a gain and a delay: \
-             the linear part is a delay of {} samples{lag}",
+            "each input is persistently exciting of order {supported_taps} only, enough for a gain and a delay: the \
+             linear part is a delay of {} samples{lag}",
             dynamics.delay
         ));
     }
