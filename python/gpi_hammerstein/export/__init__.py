@@ -222,8 +222,8 @@ def require_written(name: str, values: ArrayLike, number: type[np.floating[Any]]
     ):
         precision = "single" if number is np.float32 else "double"
         raise ParameterError(
-            f"`precision` = {precision}: `{name}` of the compensator is too large or too small for "
-            "it; use double precision or other units"
+            f"`precision` = {precision}: `{name}` of the compensator is not a normal number in it; "
+            "use double precision or other units"
         )
 
 
