@@ -36,9 +36,18 @@ OPTIONS = [
 
 @contextmanager
 def opened(
-    page: Path, folder: Path, width: int = 1400, height: int = 900, *, dark: bool = False
+    page: Path,
+    folder: Path,
+    width: int = 1400,
+    height: int = 900,
+    *,
+    dark: bool = False,
+    network: bool = True,
 ) -> Iterator[Any]:
-    """The driver of a browser that shows a page; its profile is in `folder`."""
+    """The driver of a browser that shows a page; its profile is in `folder`.
+
+    Without a network, no name resolves.
+    """
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
@@ -46,6 +55,8 @@ def opened(
     options.binary_location = str(CHROMIUM)
     for option in [*OPTIONS, f"--user-data-dir={folder / 'profile'}"]:
         options.add_argument(option)
+    if not network:
+        options.add_argument("--host-resolver-rules=MAP * ~NOTFOUND")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = webdriver.Chrome(options=options, service=Service(str(DRIVER)))
     try:

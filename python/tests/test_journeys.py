@@ -69,7 +69,7 @@ MISTAKES = {
     ),
     "an effect by another word": (
         "explain run.csv --effects mains",
-        r"did you mean `(?P<name>[\w-]+)` \(a line at a fixed frequency",
+        r"did you mean `(?P<name>[\w-]+)` \(" + re.escape(gpi.effect_names()["periodic-disturbance"]),
         "explain run.csv --half-widths 0,0.8 --thresholds 0 --order 1 --effects {name}",
     ),
     "a range with a space": (

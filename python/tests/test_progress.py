@@ -75,7 +75,13 @@ def test_a_line_says_all(record):
     assert any(re.match(r" *\d+ % structures \(order 1, 2 plays, 0 deadzones\)", line) for line in lines)
 
 
-def test_without_a_terminal_the_log_has_lines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("colour", [False, True])
+def test_without_a_terminal_the_log_has_lines(
+    colour: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # the kernels of notebooks set FORCE_COLOR; a pipe is no terminal, with or without colours
+    if colour:
+        monkeypatch.setenv("FORCE_COLOR", "1")
     path = write_csv(tmp_path / "run.csv", good_columns(1500))
     grid = ["--half-widths", "0,0.8", "--thresholds", "0", "--order", "1"]
     assert run(["identify", str(path), *grid, "--json"]) == 0

@@ -122,7 +122,7 @@ def test_the_page_says_what_was_found(found, page):
         "gpi validate 'my model.json' OTHER.csv",
         f"All {len(found.model.refinement.parameters)} parameters",
         "times smaller error",
-        "tests of the residual are passed",
+        "The residual passes",
     ):
         assert said in text, said
 

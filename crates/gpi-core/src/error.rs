@@ -131,7 +131,7 @@ pub enum Error {
 
     /// A text from a file that no honest name is like.
     #[error(
-        "{what} `{text}` {reason}, which no printed name has; rename the column or correct the file"
+        "{what} `{text}` {reason}, which is not permitted in a name; rename the column or correct the file"
     )]
     Name {
         /// What the text is, with its article.

@@ -121,7 +121,7 @@ pub fn multisine(
         spectrum[line] = Complex64::from_polar(1.0, TAU * noise.uniform());
         excited += 1;
     }
-    let requirement = format!("no line in it; the lines are {spacing} Hz apart");
+    let requirement = format!("must contain a spectral line; the lines are {spacing} Hz apart");
     Error::require(excited > 0, "band", format!("({low}, {high})"), requirement)?;
     rustfft::FftPlanner::new().plan_fft_inverse(drive.samples).process(&mut spectrum);
     Ok(drive.fit(spectrum.iter().map(|value| value.re).collect()))

@@ -54,22 +54,23 @@ Preview = Annotated[
     float | None,
     typer.Option(
         metavar="SECONDS",
-        help="Time by which the drive may begin before the reference. Default: as long as the dynamics need.",
+        help="How long before the reference the drive may begin. Default: as long as the dynamics need.",
     ),
 ]
 Start = Annotated[
     list[float] | None,
     typer.Option(
         metavar="INPUT",
-        help="Input at which the stage rests before the drive begins, once for each input; at 0, its plays "
-        "are at rest. Default: the first value of the drive, and an unknown past.",
+        help="Constant input before the drive begins, once for each input. At 0, the plays are at rest. "
+        "Default: the first value of the drive, and an unknown state of the plays.",
     ),
 ]
 StartOutput = Annotated[
     float | None,
     typer.Option(
         metavar="OUTPUT",
-        help="Output that is measured while the stage rests at --start; it tells a part of the past.",
+        help="Output that is measured at the constant input --start. It determines a part of the state of "
+        "the plays.",
     ),
 ]
 Passes = Annotated[int, typer.Option(min=0, help="Largest number of iterations after the first pass.")]
@@ -105,7 +106,8 @@ def compensate(
     if len(recording.runs) > 1:
         count = len(recording.runs)
         raise DataError(
-            f"{reference_file}: the reference has gaps and consists of {count} parts; give one without gaps"
+            f"{reference_file}: the reference has gaps and consists of {count} parts; give a reference "
+            "without gaps"
         )
     with working("compensating"):
         found = model.compensate(
@@ -181,10 +183,10 @@ def compensate(
 
 
 PARTS = {
-    "inversion": "inversion: what the limits and the passes leave",
-    "parameters": "parameters: their covariance under this drive",
-    "model": "model: what its structure leaves",
-    "past": "past: the unknown state before the drive begins",
+    "inversion": "inversion: limits of the drive, and iterations that are not complete",
+    "parameters": "parameters: uncertainty of the parameters of the model",
+    "model": "model: error of the structure of the model",
+    "past": "past: unknown state of the plays before the drive begins",
 }
 
 
@@ -199,7 +201,7 @@ def expected_table(found: Compensation, unit: str) -> Table:
         table.add_row(what, "not known" if part is None else f"{part:.4g}")
     table.add_section()
     table.add_row("compensated drive", ("> " if expected["missing"] else "") + f"{expected['rms']:.4g}")
-    table.add_row("best static curve, without these parts", f"{found.error_static_curve['rms']:.4g}")
+    table.add_row("best static curve (error of the inversion only)", f"{found.error_static_curve['rms']:.4g}")
     return table
 
 

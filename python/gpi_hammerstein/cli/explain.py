@@ -86,7 +86,9 @@ def explain(
     ] = None,
     delay: Annotated[
         int | None,
-        typer.Option(min=0, help="Make G a gain with this delay, in samples.", rich_help_panel=MODEL),
+        typer.Option(
+            min=0, help="Use a gain with this delay, in samples, as the linear part.", rich_help_panel=MODEL
+        ),
     ] = None,
     reading: Annotated[
         Literal["one-sided", "directional"],

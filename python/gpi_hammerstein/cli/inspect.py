@@ -18,9 +18,10 @@ def inspect(
 ) -> None:
     """Show what a record contains, what a model of it can determine, and the command to run next.
 
-    Prints the columns with their units and roles, and why they have these roles; rate and gaps; saturation
-    and quantisation; the band, swings and order of persistent excitation of the input; whether input and
-    output look swapped or fed back. Nothing is fitted and nothing is written.
+    Prints the columns with their units and roles, and why they have these roles; the rate and the gaps;
+    saturation and quantisation; the frequency band, the strokes and the order of persistent excitation of
+    the input; and whether input and output look swapped, or the input looks like that of a closed loop.
+    Nothing is fitted and nothing is written.
     """
     from gpi_hammerstein.inspection import inspect as look
 

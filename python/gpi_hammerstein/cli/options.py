@@ -50,7 +50,8 @@ Records = Annotated[
     list[Path],
     typer.Argument(
         metavar="RECORD",
-        help="Record files of one actuator: .csv, .csv.gz, .parquet, .npz, .npy (see --output) or .mat.",
+        help="Record files of one actuator: text (.csv, .txt, .csv.gz, ..), .xlsx, .parquet, .npz, .npy (see "
+        "--output), .mat, .h5, .lvm, .tdms or .mf4.",
         show_default=False,
     ),
 ]
@@ -144,7 +145,7 @@ Out = Annotated[
 ]
 Log = Annotated[
     bool,
-    typer.Option("--log", help="Show the progress as lines on stderr, also where it is no terminal."),
+    typer.Option("--log", help="Print the progress as lines on stderr, also if stderr is not a terminal."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
 

@@ -39,10 +39,10 @@ def report(
     ] = None,
     out: Out = Path("report.html"),
 ) -> int:
-    """Explain a record and write one HTML page: verdict, errors, effects, pictures, quality of the data.
+    """Find the effects that a model lacks, and write one HTML page with all results.
 
-    The page needs no network and no other files. The model is written beside it: model.json beside
-    report.html, and NAME.model.json beside NAME.html. `gpi explain --report` writes the page together with
+    The page needs no network and no other files. The model is written to the same folder, as model.json for
+    report.html, and as NAME.model.json for NAME.html. `gpi explain --report` writes the page together with
     the other results.
     """
     model_file = model_beside(out)

@@ -29,8 +29,7 @@ OwnRecord = Annotated[
     bool,
     typer.Option(
         "--own-record",
-        help="The record is the one that the model was fitted to: keep its effects that are functions of "
-        "time.",
+        help="The record is the one that the model was fitted to: keep the effects that depend only on time.",
     ),
 ]
 
@@ -58,10 +57,10 @@ def validate(
 ) -> None:
     """Compute the error of a model on a record, and test its residual for structure.
 
-    The error is counted like that on the held-out record of identify and explain: the unknown initial state
-    is fitted, the offset of the model is kept, and effects that are functions of the time of their own record
-    (drift, disturbances) are left out. Accepts any gpi-model/1 file. Writes validation.json and pictures of
-    the residual to DIR.
+    The error is computed in the same way as for a held-out record of identify and explain. The unknown
+    initial state is fitted, and the offset of the model is kept. Effects that depend only on
+    time (drift, disturbances) are left out, because they are different in every record. Accepts any
+    gpi-model/1 file. Writes validation.json and pictures of the residual to DIR.
     """
     model = options.load_model(model_file)
     recording = options.read(

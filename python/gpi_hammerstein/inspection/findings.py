@@ -136,7 +136,7 @@ def _of_output(name: str, unit: str, y: Array, clipped: float) -> Sequence[str]:
         return [f"The output {name} is constant, so that nothing can be identified from it."]
     if clipped > CLIPPED:
         sentences.append(
-            f"The output {name} stands at its largest or smallest value for {100 * clipped:.2g} % of "
+            f"The output {name} is at its largest or smallest value for {100 * clipped:.2g} % of "
             "the samples while the input moves: the sensor saturates there. Reduce the amplitude "
             "or the gain of the sensor."
         )

@@ -104,13 +104,13 @@ def answers(facts: Facts) -> list[Answer]:
 
 def _hysteresis(facts: Facts, found: Excitation) -> Answer:
     unit = f" {facts.input_unit}" if facts.input_unit else ""
-    limit = f"half-widths up to {0.5 * found.largest_swing:.4g}{unit}, half the largest swing"
+    limit = f"half-widths up to {0.5 * found.largest_swing:.4g}{unit}, half the largest stroke"
     if found.swings < SWINGS:
-        return Answer("hysteresis", "no", "the input turns too rarely for a loop", "triangle")
+        return Answer("hysteresis", "no", "the input reverses too rarely for a hysteresis loop", "triangle")
     if found.lengths < NESTED:
-        loops = "one loop, because all swings have one length" if found.lengths == 1 else "two loops"
+        loops = "one loop, because all strokes have the same length" if found.lengths == 1 else "two loops"
         return Answer("hysteresis", "partly", f"{limit}, but only along {loops}", "triangle")
-    return Answer("hysteresis", "yes", f"{limit}; the swings have {found.lengths} different lengths")
+    return Answer("hysteresis", "yes", f"{limit}; the strokes have {found.lengths} different lengths")
 
 
 def _dynamics(facts: Facts) -> Answer:
@@ -136,7 +136,7 @@ def _slow(facts: Facts, found: Excitation) -> Answer:
         return Answer(what, "no", f"the longest experiment takes only {facts.duration:.3g} s", "steps")
     if found.longest_hold_s >= HOLD or facts.duration >= LONG:
         rests = (
-            f"; the input rests for up to {found.longest_hold_s:.3g} s"
+            f"; the input is constant for up to {found.longest_hold_s:.3g} s"
             if found.longest_hold_s >= HOLD
             else ""
         )
@@ -144,7 +144,7 @@ def _slow(facts: Facts, found: Excitation) -> Answer:
     return Answer(
         what,
         "partly",
-        f"{lags}; creep and drift look alike, because the input never rests for {HOLD:g} s",
+        f"{lags}; creep and drift cannot be distinguished: the input is never constant for {HOLD:g} s",
         "steps",
     )
 
@@ -152,11 +152,11 @@ def _slow(facts: Facts, found: Excitation) -> Answer:
 def _rate_dependence(found: Excitation) -> Answer:
     what = "rate dependence, slew rate"
     if found.speeds >= SPEEDS:
-        return Answer(what, "yes", f"the speeds of long swings differ by a factor of {found.speeds:.3g}")
+        return Answer(what, "yes", f"the speeds of long strokes differ by a factor of {found.speeds:.3g}")
     return Answer(
         what,
         "no",
-        f"all long swings have about the same speed (factor {found.speeds:.2f}); repeat one triangle at "
+        f"all long strokes have about the same speed (factor {found.speeds:.2f}); repeat one triangle at "
         "three speeds",
         "triangle",
     )
@@ -165,8 +165,8 @@ def _rate_dependence(found: Excitation) -> Answer:
 def _amplitude(found: Excitation) -> Answer:
     what = "curves (sensor, stiffness, butterfly)"
     if found.lengths >= AMPLITUDES:
-        return Answer(what, "yes", f"the swings have {found.lengths} different lengths")
-    return Answer(what, "partly", "all swings have one amplitude", "triangle")
+        return Answer(what, "yes", f"the strokes have {found.lengths} different lengths")
+    return Answer(what, "partly", "all strokes have the same length", "triangle")
 
 
 def _periodic(facts: Facts) -> Answer:
@@ -191,7 +191,9 @@ def _noise(facts: Facts, found: Excitation) -> Answer:
     if found.period_s is not None:
         return Answer(what, "yes", f"the input repeats every {found.period_s:.4g} s")
     if found.longest_hold_s >= 1.0:
-        return Answer(what, "yes", "the input rests")
+        return Answer(what, "yes", "the input is constant for a while")
     return Answer(
-        what, "partly", "estimated from high frequencies, because the input neither repeats nor rests"
+        what,
+        "partly",
+        "estimated from high frequencies, because the input neither repeats nor is constant for a while",
     )

@@ -112,11 +112,11 @@ def _signals(found: Mapping[str, Any]) -> list[str]:
         low, high = one["band_hz"]
         text = (
             f"input {one['name']}: {one['low']:.4g} to {one['high']:.4g} {one['unit']}".rstrip()
-            + f", {low:.3g} to {high:.3g} Hz, {_count(one['swings'], 'large swing')}, "
-            f"{_count(one['lengths'], 'length')} of swings"
+            + f", {low:.3g} to {high:.3g} Hz, {_count(one['swings'], 'large stroke')} of "
+            f"{_count(one['lengths'], 'different length')}"
         )
         if one["longest_hold_s"] * found["record"]["rate_hz"] > 10:
-            text += f", rests for up to {one['longest_hold_s']:.3g} s"
+            text += f", constant for up to {one['longest_hold_s']:.3g} s"
         if one["period_s"]:
             text += f", repeats every {one['period_s']:.4g} s"
         lines.append(text)

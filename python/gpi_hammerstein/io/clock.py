@@ -64,7 +64,9 @@ def uniform_rate(stamps: Array, source: str) -> float:
     except DataError as error:
         raise DataError(f"{source}: {error}{_advice(stamps)}") from error
     if not np.isfinite(rate):
-        raise DataError(f"{source}: the time stamps are too close for a sampling rate; correct their unit")
+        raise DataError(
+            f"{source}: the time stamps are too close together to compute a sampling rate; correct their unit"
+        )
     whole = float(round(rate))
     return whole if whole and abs(rate - whole) <= 1e-6 * rate else rate
 

@@ -129,7 +129,7 @@ class Recording:
             if samples >= len(run.u):
                 raise DataError(
                     f"`skip` = {seconds} s is {samples} samples, but an experiment has {len(run.u)}; "
-                    "skip less"
+                    "give a shorter time"
                 )
             return replace(run, warmup=max(run.warmup, samples))
 

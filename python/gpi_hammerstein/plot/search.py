@@ -46,7 +46,7 @@ def candidates(found: Model | Identification, ax: Axes | None = None) -> Axes:
     known = found.identification if isinstance(found, Model) else found
     rows = [] if known is None else known.candidates
     if not rows:
-        say_nothing_to_draw(ax, "no structures: the model is not from identify")
+        say_nothing_to_draw(ax, "no structures: only models that `identify` returns contain them")
         return ax
     used = np.array([row["used"] for row in rows])
     # structures that are ruled out have no criterion

@@ -70,7 +70,7 @@ def sure(found: Explanation, components: Sequence[Component]) -> tuple[str, str]
     passed = sum(test["passed"] for test in found.tests)
     sentences = [
         rest.strip().capitalize(),
-        f"{passed} of {len(found.tests)} tests of the residual are passed.",
+        f"The residual passes {passed} of {len(found.tests)} tests.",
     ]
     if components:
         weakest = min(components, key=lambda one: one.evidence)
@@ -112,7 +112,7 @@ def better(found: Explanation, unit: str) -> tuple[str, str]:
 def following(found: Explanation) -> tuple[str, str]:
     """Return the next experiment, or the next use of the model."""
     if not found.next_experiment:
-        link = '<p><a href="#commands">Commands that go on from here</a></p>'
+        link = '<p><a href="#commands">Commands for the next steps</a></p>'
         return "Use the model", "<p>No further experiment is needed for the verdict.</p>" + link
     why, command = found.next_experiment["why"], found.next_experiment["command"]
     line = '<p><a href="#next">The command</a></p>' if command else ""

@@ -132,7 +132,7 @@ def contributions(found: Explanation, own: Sequence[Component], unit: str) -> st
     rows.append(
         [
             "residual",
-            "what is left in the end",
+            "what the final model does not explain",
             f"{100 * share:.3g} %",
             f"{after:.4g}{label and f' {unit}'}",
             *[""] * 4,

@@ -35,7 +35,7 @@ pub struct Covariate {
 impl Covariate {
     pub(super) const NAME: &'static str = "covariate";
     pub(super) const WHAT: &'static str =
-        "another measured column leaks in, possibly through a lag";
+        "another measured column influences the output, possibly with a lag";
     pub(super) const SYNONYMS: &'static [&'static str] =
         &["temperature", "disturbance column", "crosstalk", "cross-talk", "leak", "neighbour axis"];
     pub(super) const STAGE: Stage = Stage::Added;

@@ -28,7 +28,7 @@ pub struct LinearDynamics {
 
 impl LinearDynamics {
     pub(super) const NAME: &'static str = "linear-dynamics";
-    pub(super) const WHAT: &'static str = "a mode or an order that the linear part lacks";
+    pub(super) const WHAT: &'static str = "a resonance or another pole that the linear part lacks";
     pub(super) const SYNONYMS: &'static [&'static str] =
         &["mode", "resonance", "dynamics", "order", "pole", "linear"];
     pub(super) const STAGE: Stage = Stage::Dynamics;

@@ -31,7 +31,7 @@ pub struct PeriodicDisturbance {
 impl PeriodicDisturbance {
     pub(super) const NAME: &'static str = "periodic-disturbance";
     pub(super) const WHAT: &'static str =
-        "a line at a fixed frequency that the input does not drive";
+        "a sinusoidal disturbance of fixed frequency, such as mains hum";
     pub(super) const SYNONYMS: &'static [&'static str] = &[
         "mains",
         "mains hum",

@@ -31,7 +31,7 @@ pub struct Stiffness {
 impl Stiffness {
     pub(super) const NAME: &'static str = "stiffness";
     pub(super) const WHAT: &'static str =
-        "the resonance moves with amplitude: nonlinearity inside the mechanical loop";
+        "nonlinear stiffness: the resonance frequency depends on the amplitude";
     pub(super) const SYNONYMS: &'static [&'static str] =
         &["spring", "duffing", "nonlinear stiffness", "moving resonance", "hardening", "softening"];
     pub(super) const STAGE: Stage = Stage::Dynamics;

@@ -132,22 +132,22 @@ impl Refusal {
     /// What is said of the effect, after its name; `taken` is the one that was accepted instead.
     pub(super) fn in_words(self, taken: &str) -> String {
         match self {
-            Self::Undriven => "is a decay here, which the input does not drive".to_owned(),
-            Self::Insignificant => "gains no more than the significance threshold".to_owned(),
+            Self::Undriven => "would only represent a decay that the input does not drive".to_owned(),
+            Self::Insignificant => "does not reduce the error by more than the significance threshold".to_owned(),
             Self::Unconfirmed => "is not confirmed by the held-out blocks".to_owned(),
             Self::Insubstantial => {
-                "removes too small a part of the residual, which is far above the noise".to_owned()
+                "removes only a small part of a residual that is far above the noise".to_owned()
             }
-            Self::Impossible => "would need values that no machine has".to_owned(),
+            Self::Impossible => "would need parameter values that no real machine has".to_owned(),
             Self::NotAMode => {
-                "would follow a line, creep or a disturbance, which the input does not drive".to_owned()
+                "would represent a spectral line, creep or a disturbance instead of a mode of the stage".to_owned()
             }
-            Self::NotItsOwn => "does nothing that the rest of the model cannot do".to_owned(),
-            Self::Gaps => "does not predict gaps between its knots as well as it fits".to_owned(),
+            Self::NotItsOwn => "adds nothing to the output that the rest of the model cannot represent".to_owned(),
+            Self::Gaps => "predicts the output between its knots much worse than it fits the samples at the knots".to_owned(),
             Self::TooLarge => {
-                "would be a large part of the output, and the model would still be far from the noise".to_owned()
+                "would add a large part of the output, but the error of the model would still be far above the noise".to_owned()
             }
-            Self::LongerFit => "gains no more than a longer fit of the model without it".to_owned(),
+            Self::LongerFit => "reduces the error no more than a longer fit of the model without it".to_owned(),
             Self::Confounded => format!("explains as much as {taken}"),
             Self::Inferior => format!("explains less than {taken}"),
         }

@@ -85,18 +85,18 @@ const TRIANGLE: &str = "triangle";
 fn separation(by: SeparatedBy) -> (&'static str, &'static str) {
     match by {
         SeparatedBy::Rests => (
-            "hold the input still for minutes, at rest and after large steps: creep follows each step, drift does \
-             not, and a drifting gain shows only away from zero",
+            "keep the input constant for minutes, at zero and after large steps: creep follows each step, drift does \
+             not, and a drift of the gain is visible only if the output is not zero",
             "steps",
         ),
         SeparatedBy::Levels => (
-            "drive slow triangles of several sizes around several levels: a sensor's curve depends on the level \
-             alone, the shape of a loop on the input's history, and stiffness needs speed",
+            "drive slow triangles of several amplitudes around several levels: a sensor's curve depends only on the \
+             level, the shape of a loop depends on the history of the input, and stiffness acts only in fast motion",
             TRIANGLE,
         ),
         SeparatedBy::Speeds => (
-            "drive the same triangle at several speeds: a slew limit starts at one speed, loops that open with \
-             speed do so at all of them",
+            "drive the same triangle at several speeds: a slew limit acts only above a certain speed, and rate \
+             dependence widens the loop at every speed",
             TRIANGLE,
         ),
         SeparatedBy::Nothing => ("repeat the experiment with another input", TRIANGLE),
@@ -147,7 +147,7 @@ pub(super) fn next_experiment(
         let by = groups.into_iter().find(alike).unwrap_or(SeparatedBy::Nothing);
         let (how, kind) = separation(by);
         let with = one.confounded_with.join(", ");
-        let why = format!("{} and {with} explain the same here; {how}", one.effect);
+        let why = format!("{} and {with} explain this record equally well; {how}", one.effect);
         return Some(NextExperiment { why, command: command(kind) });
     }
     if matches!(verdict, Verdict::Explained | Verdict::OutsideClass) {
@@ -155,18 +155,22 @@ pub(super) fn next_experiment(
         return None;
     }
     if is_one_sine(record) {
-        let why = "one cycle that repeats cannot separate a sensor's curve, the shape of a loop, stiffness or a mode \
-                   from the declared model; drive triangles of several sizes";
+        let why = "a record of one cycle that repeats cannot distinguish a sensor's curve, the shape of a loop, \
+                   stiffness or a mode from the declared model; drive triangles of several amplitudes";
         return Some(NextExperiment { why: why.to_owned(), command: command(TRIANGLE) });
     }
     let worst = tests
         .iter()
         .filter(|test| !test.passed() && STRUCTURE.contains(&test.name))
         .max_by(|a, b| (a.statistic / a.threshold).total_cmp(&(b.statistic / b.threshold)))?;
-    let found = if effects.is_empty() { "nothing" } else { "not everything" };
+    let found = if effects.is_empty() {
+        "no effect of the catalogue"
+    } else {
+        "no further effect of the catalogue"
+    };
     let why = format!(
-        "{found} in the catalogue explains the residual, which fails the test `{}` ({}); a record in which \
-         one thing changes at a time tells more",
+        "{found} explains the residual, which fails the test `{}` (possible causes: {}); record experiments in \
+         which only one quantity changes at a time",
         worst.name, worst.points_to
     );
     Some(NextExperiment { why, command: command(TRIANGLE) })

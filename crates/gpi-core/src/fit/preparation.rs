@@ -91,8 +91,8 @@ impl<'a> Prepared<'a> {
                 _ => {
                     has_unknown_plays[index] = true;
                     notes.push(format!(
-                        "experiment {index} has an unknown initial state, and the plays depend on it for \
-                         long: their initial state is fitted"
+                        "experiment {index} has an unknown initial state, on which the plays depend for a long time: \
+                         the initial state of the plays is fitted"
                     ));
                 }
             }

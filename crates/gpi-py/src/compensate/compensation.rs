@@ -86,7 +86,7 @@ impl Compensation {
         figures(py, &self.found.error)
     }
 
-    /// The error of the true output, without the noise of the sensor, that is to be expected behind the lead, (T10) in the theory.
+    /// The error of the true output that is to be expected after the lead, without the noise of the sensor, (T11) in the theory.
     ///
     /// ``rms`` over all outputs; ``bound``, which 95 % of the errors at the worst sample do not exceed; ``parts``: ``inversion``,
     /// ``parameters``, ``model`` and ``past``, whose squares add up to that of ``rms``; ``missing``, the names of the parts that

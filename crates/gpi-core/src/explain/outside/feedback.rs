@@ -101,9 +101,9 @@ fn predicted(
 /// What it means for the estimate.
 pub(super) fn note(input: &str) -> String {
     format!(
-        "Past outputs predict the input {input} beyond what its own past predicts. The input seems to depend on the output, as \
-         it does under feedback. The estimate is then biased: disturbances of the output return through the input, and \
-         are taken for its response. An experiment in open loop does not have this bias."
+        "Past outputs help to predict the input {input}, so that the input seems to depend on the output, as in a closed \
+         loop. If this is so, the model is biased, because the controller feeds disturbances of the output back to the \
+         input. Repeat the experiment in open loop."
     )
 }
 
