@@ -11,8 +11,8 @@ Other programs and other pages can reach a port of 127.0.0.1 too. Four checks ke
 - **Code.** The address with which the browser is started is visible to other users of the machine in the list
   of processes. It contains a code in place of the token, which is valid only once.
 
-Every response has a strict content security policy: the page loads and sends nothing from or to elsewhere, and
-runs no script but its own file.
+Every response has a strict content security policy: the page loads nothing from elsewhere, sends nothing
+elsewhere, and runs no script but its own files.
 """
 
 import secrets

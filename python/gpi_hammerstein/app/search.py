@@ -1,4 +1,4 @@
-"""The search, which another process runs: so the page answers meanwhile, and it can be ended at any moment."""
+"""The search, which another process runs: the page answers meanwhile, and it can be ended at any moment."""
 
 import json
 import os

@@ -190,6 +190,6 @@ def known_suffix(name: str) -> str:
 def too_large(name: str, most: int) -> TooLarge:
     """Return the error for a file that is too large."""
     return TooLarge(
-        f"{name}: has more than {most} bytes; start `gpi app` with a larger value of the environment variable "
-        f"{UPLOAD}, or use the command line"
+        f"{name}: has more than {most} bytes; start `gpi app` with a larger value of the environment "
+        f"variable {UPLOAD}, or use the command line"
     )

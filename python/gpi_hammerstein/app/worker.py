@@ -1,8 +1,9 @@
 """The process that searches; see :mod:`gpi_hammerstein.app.search`.
 
 It reads one line of JSON, the request, and writes lines of JSON: ``{"progress": ..}`` while it works, and at
-the end ``{"done": ..}``, ``{"stopped": ..}`` or ``{"failed": ..}``. Another line on its standard input asks it
-to stop and to keep what was found. If its standard input is closed, the app has ended, and it ends at once.
+the end ``{"done": ..}``, ``{"stopped": ..}`` or ``{"failed": ..}``. Another line on its standard input asks
+it to stop and to keep what was found. If its standard input is closed, the app has ended, and it ends at
+once.
 """
 
 import json
