@@ -55,10 +55,12 @@ def drive(model: Model, uploads: Uploads, choices: Choices, out: Path) -> tuple[
     paths = [upload.path for upload in uploads.find(choices.files)]
     recording = read_for_model(model, paths, **choices.reading())
     require_match(model, recording)
+    units = set(model.output_units)
     found: dict[str, Any] = {
         "samples": sum(len(run.u) for run in recording.runs),
         "experiments": len(recording.runs),
         "notes": [uploads.shown(note) for note in recording.notes],
+        "unit": units.pop() if len(units) == 1 else "",
         "error": None,
         "fit_percent": {},
         "rule": "from the steady state at the first input",

@@ -162,35 +162,31 @@ class Plots {
       if (!found.has(key)) found.set(key, []);
       found.get(key).push({ ...line, label: together ? (line.kind === "output" ? "measured" : "simulated") : line.name });
     }
+    // the simulated output is drawn over the measured one
+    for (const lines of found.values()) lines.sort((one, other) => (one.kind === "simulated") - (other.kind === "simulated"));
     return [...found.values()];
   }
 
   draw() {
     for (const chart of this.charts) chart.destroy();
-    this.area.replaceChildren();
-    const groups = this.groups();
-    this.charts = [...groups.map((lines) => this.overTime(lines)), ...this.part.loops.map((loop) => this.loop(loop))];
+    const work = [...this.groups().map((lines) => (cell) => this.overTime(lines, cell)),
+      ...this.part.loops.map((loop) => (cell) => this.loop(loop, cell))];
+    // all cells first, because their number decides how wide they are
+    const cells = work.map(() => Object.assign(document.createElement("div"), { role: "img" }));
+    this.area.replaceChildren(...cells);
+    this.charts = work.map((draw, i) => draw(cells[i]));
   }
 
-  cell(title) {
-    const cell = document.createElement("div");
-    cell.setAttribute("role", "img");
-    cell.setAttribute("aria-label", title);
-    this.area.append(cell);
-    return cell;
-  }
-
-  overTime(lines) {
+  overTime(lines, cell) {
     const [first] = lines, names = [...new Set(lines.map((one) => one.name))].join(", ");
     const what = { input: "Input", output: "Output", covariate: "Other column", residual: "Residual of", simulated: "Simulated" }[first.kind];
     const title = new Set(lines.map((one) => one.kind)).size > 1 ? `${first.name}: measured and simulated` : `${what} ${names}`;
-    const cell = this.cell(title + " over time");
+    cell.setAttribute("aria-label", title + " over time");
     const series = lines.map((one, i) => {
       const style = STYLES[one.kind] ?? {};
       return { label: one.label, stroke: colour(style.colour ?? SHADES[i % SHADES.length]), width: 1.2, dash: style.dash,
         points: { show: false }, value: (_, value) => number(value) };
     });
-    // the order of drawing: measured below simulated
     return new uPlot({
       title, width: widthOf(cell), height: 220,
       series: [{ label: "time [s]", value: (_, value) => number(value) }, ...series],
@@ -210,11 +206,11 @@ class Plots {
   }
 
   // The output over the input: as points, because they are thinned out.
-  loop({ input, output, x, y }) {
+  loop({ input, output, x, y }, cell) {
     const [from, to] = [this.part.lines[input], this.part.lines[output]];
-    const cell = this.cell(`${to.name} over ${from.name}`);
+    cell.setAttribute("aria-label", `${to.name} over ${from.name}`);
     const points = (plot, index) => {
-      const size = devicePixelRatio * 1.5, path = new Path2D(), [xs, ys] = plot.data[index];
+      const size = devicePixelRatio * 2, path = new Path2D(), [xs, ys] = plot.data[index];
       for (let i = 0; i < xs.length; i++) {
         if (xs[i] === null || ys[i] === null) continue;
         path.rect(plot.valToPos(xs[i], "x", true) - size / 2, plot.valToPos(ys[i], "y", true) - size / 2, size, size);
@@ -374,11 +370,11 @@ function follow(status) {
 function tell(status) {
   const now = status.progress, running = ["running", "stopping"].includes(status.state);
   element("bar").value = now?.done ?? 0;
-  element("now-done").textContent = now ? `${Math.round(100 * now.done)} %` : "";
-  element("now-stage").textContent = status.writing ? "drawing the report" : now?.stage ?? "reading the record";
+  element("now-done").textContent = `${Math.round(100 * (now?.done ?? 0))} %`;
+  element("now-stage").textContent = status.writing ? "drawing the report" : now?.stage ?? "starting";
   element("now-trial").textContent = now?.trial || "-";
   element("now-error").textContent = now?.error === null || !now ? "-" : number(now.error);
-  element("now-elapsed").textContent = clock(now?.elapsed);
+  element("now-elapsed").textContent = clock(now?.elapsed ?? 0);
   element("now-left").textContent = now?.remaining === null || !now ? "not known yet" : clock(now.remaining);
   element("cancel").hidden = !running;
   element("cancel").textContent = status.state === "stopping" ? "End at once, and keep nothing" : "Stop, and keep what was found";
@@ -436,8 +432,8 @@ async function driveOther() {
   element("driven-title").textContent = `${otherFile.name}: ${found.samples} samples`;
   const { error } = found, rows = [];
   if (error) {
-    rows.push(["rms error", number(error.rms)], ["rms error / span", `${number(100 * error.nrmse)} %`],
-      ["largest error", number(error.max)]);
+    rows.push(["rms error", `${number(error.rms)} ${found.unit}`], ["rms error / span", `${number(100 * error.nrmse)} %`],
+      ["largest error", `${number(error.max)} ${found.unit}`]);
     for (const [name, fit] of Object.entries(found.fit_percent)) rows.push([`fit of ${name}`, `${number(fit)} %`]);
   }
   element("errors").tBodies[0].replaceChildren(...rows.map(row));
