@@ -36,9 +36,9 @@ OPTIONS = [
 
 @contextmanager
 def opened(
-    page: Path, folder: Path, width: int = 1400, height: int = 900, *, dark: bool = False
+    page: Path | str, folder: Path, width: int = 1400, height: int = 900, *, dark: bool = False
 ) -> Iterator[Any]:
-    """The driver of a browser that shows a page; its profile is in `folder`."""
+    """The driver of a browser that shows a file or an address; its profile is in `folder`."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
@@ -54,7 +54,7 @@ def opened(
         if dark:
             feature = {"name": "prefers-color-scheme", "value": "dark"}
             driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [feature]})
-        driver.get(page.as_uri())
+        driver.get(page if isinstance(page, str) else page.as_uri())
         yield driver
     finally:
         driver.quit()

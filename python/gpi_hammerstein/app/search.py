@@ -31,7 +31,12 @@ class Search:
 
     def __init__(self, request: dict[str, Any]) -> None:
         self._lock = threading.Lock()
-        self._status: dict[str, Any] = {"state": "running", "progress": None, "writing": False}
+        self._status: dict[str, Any] = {
+            "state": "running",
+            "progress": None,
+            "keeps": False,
+            "writing": False,
+        }
         self._version = 0
         self._process = subprocess.Popen(
             [sys.executable, *WORKER],
@@ -51,8 +56,9 @@ class Search:
         -------
         dict
             ``state`` (running, stopping, done, stopped or failed), ``version`` (grows with each change),
-            ``progress`` with the properties of `gpi_hammerstein.Progress`, ``writing`` (whether the results
-            are written), and at the end ``result``, ``message`` or ``error``.
+            ``progress`` with the properties of `gpi_hammerstein.Progress`, ``keeps`` (whether a model is
+            kept if the search is stopped now), ``writing`` (whether the results are written), and at the end
+            ``result``, ``message`` or ``error``.
         """
         with self._lock:
             return {**self._status, "version": self._version}

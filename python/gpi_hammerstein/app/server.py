@@ -111,4 +111,6 @@ def listening() -> socket.socket:
         # without it, another program could take the same port
         own.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
     own.bind(("127.0.0.1", 0))
+    # a browser that comes before the server is ready waits
+    own.listen()
     return own

@@ -127,6 +127,8 @@ class Uploads:
         for upload in self._kept.values():
             name = shlex.quote(upload.name) if quoted else upload.name
             text = text.replace(str(upload.path), name).replace(upload.path.name, name)
+            # names that were made of it, such as that of a report
+            text = text.replace(upload.key, upload.name.split(".")[0])
         return text
 
 

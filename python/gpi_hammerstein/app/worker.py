@@ -27,6 +27,9 @@ from gpi_hammerstein.report import report_html
 
 # Seconds between two reports of the progress: more of them could not be read.
 PAUSE = 0.1
+# The first stage after the declared model was fitted. From then on, a search that is stopped has a model.
+SEARCHES = "score test"
+FIELDS = ("stage", "trial", "done", "error", "elapsed", "remaining")
 REPORT, MODEL, EXPLANATION = "report.html", "model.json", "explanation.json"
 NOTHING_KEPT = (
     "The search was stopped before the declared model was fitted, so that there was no model to keep."
@@ -56,16 +59,17 @@ def work(request: dict[str, Any], stop: threading.Event, tell: Tell) -> None:
     --------
     >>> work({"paths": ["run.csv"], "out": "found", **others}, threading.Event(), print)  # doctest: +SKIP
     """
-    last = -PAUSE
+    last, keeps = -PAUSE, False
 
     def progress(now: Progress) -> None:
-        nonlocal last
+        nonlocal last, keeps
         if stop.is_set():
             raise Stopped
+        keeps = keeps or now.stage == SEARCHES
         if time.monotonic() - last < PAUSE and now.done < 1.0:
             return
         last = time.monotonic()
-        tell({"progress": {name: getattr(now, name) for name in FIELDS}})
+        tell({"progress": {name: getattr(now, name) for name in FIELDS}, "keeps": keeps})
 
     try:
         recording = read_recording([Path(path) for path in request["paths"]], **request["reading"])
@@ -76,9 +80,6 @@ def work(request: dict[str, Any], stop: threading.Event, tell: Tell) -> None:
         tell({"stopped": NOTHING_KEPT})
     except GpiError as error:
         tell({"failed": {"error": type(error).__name__, "message": str(error)}})
-
-
-FIELDS = ("stage", "trial", "done", "error", "elapsed", "remaining")
 
 
 def written(found: Explanation, recording: Recording, out: Path, command: str) -> dict[str, Any]:

@@ -377,7 +377,10 @@ function tell(status) {
   element("now-elapsed").textContent = clock(now?.elapsed ?? 0);
   element("now-left").textContent = now?.remaining === null || !now ? "not known yet" : clock(now.remaining);
   element("cancel").hidden = !running;
-  element("cancel").textContent = status.state === "stopping" ? "End at once, and keep nothing" : "Stop, and keep what was found";
+  element("cancel").textContent = status.state === "stopping" ? "End at once, and keep nothing"
+    : status.keeps ? "Stop, and keep what was found" : "Stop";
+  element("cancel-hint").textContent = status.state === "running" && !status.keeps
+    ? "If you stop now, no model is kept: the declared model is not fitted yet." : "";
   element("search-words").textContent = {
     running: "", stopping: "Stopping: the last fit is completed.", done: "The search is complete.",
     stopped: "The search was stopped.", failed: "The search failed.",
