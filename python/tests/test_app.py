@@ -2,8 +2,10 @@
 
 import http.client
 import json
+import os
 import re
 import signal
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -16,7 +18,9 @@ import pytest
 import gpi_hammerstein as gpi
 from gpi_hammerstein.app import require_libraries
 from gpi_hammerstein.app.routes import PAGE
+from gpi_hammerstein.app.search import RUNNING
 from gpi_hammerstein.app.signals import GROUPS, Channel, Signals
+from gpi_hammerstein.app.worker import NOTHING_KEPT, work
 from gpi_hammerstein.cli import run
 from records import RATE, actuator, drive, good_columns, write_csv
 from served import Client, served, started
@@ -30,8 +34,8 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     other = good_columns(1200, seed=5)
     write_csv(folder / "other.csv", other)
     write_csv(folder / "drive.csv", {name: other[name] for name in ("t_s", "u_V")})
-    u = drive(6000)
-    t = np.arange(6000) / RATE
+    u = drive(2000)
+    t = np.arange(2000) / RATE
     hum = 0.3 * np.sin(2 * np.pi * 50.3 * t) + 0.2 * np.sin(2 * np.pi * 120.7 * t)
     write_csv(folder / "long.csv", {"t_s": t.round(9), "u_V": u, "y_um": actuator(u) + hum + 0.1 * t})
     return folder
@@ -326,49 +330,60 @@ def test_the_compensator_is_written_in_c(
     assert refused.status == 422 and refused.json()["error"] == "ParameterError"
 
 
-def test_a_search_that_is_stopped(client: Client, searched: list[dict[str, Any]], lab: Path) -> None:
-    """After the model was fitted, it is kept; before, nothing is; a second wish ends the search at once."""
-    key = client.upload(lab / "long.csv")
-    running = ("running", "stopping")
-    old = client.get("/results/model.json").body
-
-    def searching() -> None:
-        assert client.post("/search", {"files": [key]}).status == 200
-
-    searching()
-    client.wait(lambda status: status["progress"])
-    client.post("/cancel", {})
-    status = client.wait(lambda status: status["state"] not in running)
-    assert status["state"] == "stopped" and "before the declared model was fitted" in status["message"]
-    assert client.get("/results/model.json").body == old
-
-    searching()
+def test_a_search_that_is_stopped_keeps_its_model(
+    client: Client, searched: list[dict[str, Any]], lab: Path
+) -> None:
+    old = client.get("/results/model.json").body.decode()
+    assert client.post("/search", {"files": [client.upload(lab / "long.csv")]}).status == 200
+    client.wait(lambda status: status["keeps"] or status["state"] not in RUNNING)
     assert client.post("/cancel", {}).json()["state"] == "stopping"
+    status = client.wait(lambda status: status["state"] not in RUNNING)
+    assert status["state"] == "done" and status["result"]["interrupted"]
+    assert status["result"]["sentences"][0].startswith("The search was stopped before it was complete")
+    kept = client.get("/results/model.json").body.decode()
+    assert kept != old and gpi.Model.from_json(kept).rate == RATE
+
+
+def test_a_second_wish_ends_the_search_at_once(client: Client, lab: Path) -> None:
+    assert client.post("/search", {"files": [client.upload(lab / "long.csv")]}).status == 200
     begin = time.monotonic()
+    assert client.post("/cancel", {}).json()["state"] == "stopping"
     status = client.post("/cancel", {}).json()
-    assert status["state"] == "stopped" and "at once" in status["message"]
+    assert status["state"] == "stopped" and "ended at once" in status["message"]
     assert client.session.search is not None
     client.session.search.close()
     assert time.monotonic() - begin < 1.0
 
-    searching()
-    client.wait(lambda status: status["keeps"] or status["state"] not in running)
-    client.post("/cancel", {})
-    status = client.wait(lambda status: status["state"] not in running)
-    assert status["state"] == "done" and status["result"]["interrupted"]
-    assert status["result"]["sentences"][0].startswith("The search was stopped before it was complete")
-    kept = client.get("/results/model.json").body.decode()
-    assert kept != old.decode() and gpi.Model.from_json(kept).rate == RATE
+
+def test_a_process_that_dies_is_a_message(client: Client, lab: Path) -> None:
+    assert client.post("/search", {"files": [client.upload(lab / "long.csv")]}).status == 200
+    for one in children(os.getpid()):
+        if b"gpi_hammerstein_launcher.search" in Path(f"/proc/{one}/cmdline").read_bytes():
+            os.kill(one, signal.SIGKILL)
+    status = client.wait(lambda status: status["state"] not in RUNNING)
+    assert status["state"] == "failed" and "ended with code -9" in status["message"]
 
 
-def test_an_unusable_record_fails_with_its_message(client: Client, tmp_path: Path) -> None:
-    u, y = np.zeros(1500), np.arange(1500.0)
-    key = client.upload(
-        write_csv(tmp_path / "still.csv", {"t_s": np.arange(1500) / RATE, "u_V": u, "y_um": y})
-    )
-    assert client.post("/search", {"files": [key]}).status == 200
-    status = client.wait(lambda status: status["state"] not in ("running", "stopping"))
-    assert status["state"] == "failed" and status["error"] == "DataError" and "u" in status["message"]
+def worked(path: Path, out: Path, stop: threading.Event) -> dict[str, Any]:
+    """The last answer of a search in this process."""
+    answers: list[dict[str, Any]] = []
+    request = {"paths": [str(path)], "reading": {}, "effects": None, "out": str(out), "command": "gpi"}
+    work(request, stop, answers.append)
+    return answers[-1]
+
+
+def test_before_the_model_is_fitted_nothing_is_kept(lab: Path, tmp_path: Path) -> None:
+    stop = threading.Event()
+    stop.set()
+    assert worked(lab / "long.csv", tmp_path / "out", stop) == {"stopped": NOTHING_KEPT}
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unusable_record_fails_with_its_message(tmp_path: Path) -> None:
+    t = np.arange(1500) / RATE
+    path = write_csv(tmp_path / "still.csv", {"t_s": t, "u_V": 0.0 * t, "y_um": t})
+    failed = worked(path, tmp_path / "out", threading.Event())["failed"]
+    assert failed["error"] == "DataError" and "`u`" in failed["message"]
 
 
 def test_without_the_libraries_the_message_says_how_to_install_them(
@@ -383,7 +398,16 @@ def test_without_the_libraries_the_message_says_how_to_install_them(
 
 def children(process: int) -> list[int]:
     """The processes that a process has started."""
-    return [int(one) for one in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+    tasks = Path(f"/proc/{process}/task").glob("*/children")
+    return [int(one) for task in tasks for one in task.read_text().split()]
+
+
+def has_ended(process: int) -> bool:
+    """Whether a process is gone, or only waits for somebody to note its end."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")")[-1].split()[0] in "ZX"
+    except FileNotFoundError:
+        return True
 
 
 def test_ctrl_c_ends_server_and_search_within_a_second(tmp_path: Path, lab: Path) -> None:
@@ -400,7 +424,7 @@ def test_ctrl_c_ends_server_and_search_within_a_second(tmp_path: Path, lab: Path
         begin = time.monotonic()
         process.send_signal(signal.SIGINT)
         assert process.wait(10) == 130
-        while Path(f"/proc/{worker}").exists() and time.monotonic() - begin < 5:
+        while not has_ended(worker) and time.monotonic() - begin < 5:
             time.sleep(0.01)
         assert time.monotonic() - begin < 1.0
         assert process.stderr is not None and "Traceback" not in process.stderr.read()

@@ -7,6 +7,7 @@ from gpi_hammerstein.app.choices import Choices
 from gpi_hammerstein.app.signals import Signals, signals_of
 from gpi_hammerstein.app.uploads import Uploads
 from gpi_hammerstein.inspection import inspect
+from gpi_hammerstein.inspection.text import text_of
 from gpi_hammerstein.io import read_recording
 
 
@@ -40,7 +41,7 @@ def look(uploads: Uploads, choices: Choices) -> tuple[dict[str, Any], Signals | 
     paths = [upload.path for upload in uploads.find(choices.files)]
     found = inspect(paths, **choices.columns())
     facts: dict[str, Any] = renamed(found.to_dict(), uploads)
-    facts["text"] = uploads.shown(str(found))
+    facts["text"] = text_of(facts)
     reading = choices.columns()
     if found.assumed is not None:
         # the only record that is read in spite of a problem: with a clock that is not uniform

@@ -133,7 +133,7 @@ def page_file(package: str, name: str, kind: str) -> Answer:
     return answer
 
 
-def posted(work: Callable[[dict[str, Any]], dict[str, Any]], session: Session) -> Answer:
+def posted(work: Callable[[dict[str, Any]], dict[str, Any] | None], session: Session) -> Answer:
     """Return what answers to a JSON object with another one; the work is done in a thread."""
 
     async def answer(request: Request) -> Response:
@@ -163,12 +163,9 @@ def refusal(session: Session, error: Exception) -> Response:
 async def events(session: Session) -> AsyncIterator[str]:
     """Yield what the search does, as server-sent events, until it ends."""
     seen, silent = -1, 0.0
-    while session.search is not None:
-        status = session.search.status()
+    while (status := session.status()) is not None:
         if status["version"] != seen:
             seen, silent = status["version"], 0.0
-            if "message" in status:
-                status["message"] = session.uploads.shown(status["message"])
             yield f"data: {json.dumps(plain(status))}\n\n"
         if status["state"] not in RUNNING:
             return

@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 # What the interpreter runs. Option -P: the modules of the working folder are not imported.
-WORKER = ("-P", "-m", "gpi_hammerstein.app.worker")
+SEARCH = ("-P", "-m", "gpi_hammerstein_launcher.search")
 ENDED_AT_ONCE = "The search was ended at once, and nothing was kept."
 RUNNING = ("running", "stopping")
 
@@ -39,12 +39,13 @@ class Search:
         }
         self._version = 0
         self._process = subprocess.Popen(
-            [sys.executable, *WORKER],
+            [sys.executable, *SEARCH],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             env=os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
         )
+        # one line, which ends with the only line break
         self._send(json.dumps(request).encode() + b"\n")
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()

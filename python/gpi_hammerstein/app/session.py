@@ -68,8 +68,17 @@ class Session:
             "version": __version__,
             "largest_upload": largest_upload(),
             "effects": effect_names(),
-            "search": None if self.search is None else self.search.status(),
+            "search": self.status(),
         }
+
+    def status(self) -> dict[str, Any] | None:
+        """Return what the search does, with the names of files that the user knows; None without a search."""
+        if self.search is None:
+            return None
+        status = self.search.status()
+        if "message" in status:
+            status["message"] = self.uploads.shown(status["message"])
+        return status
 
     def inspect(self, request: dict[str, Any]) -> dict[str, Any]:
         """Inspect files."""
@@ -77,7 +86,7 @@ class Session:
         self._draw("record", signals)
         return {**facts, "drawn": signals is not None}
 
-    def start(self, request: dict[str, Any]) -> dict[str, Any]:
+    def start(self, request: dict[str, Any]) -> dict[str, Any] | None:
         """Start a search."""
         if self.search is not None and self.search.is_running():
             raise ParameterError("a search is running; stop it before another one is started")
@@ -97,14 +106,14 @@ class Session:
                 "command": on_the_command_line(uploads, request),
             }
         )
-        return self.search.status()
+        return self.status()
 
-    def cancel(self, request: dict[str, Any]) -> dict[str, Any]:
+    def cancel(self, request: dict[str, Any]) -> dict[str, Any] | None:
         """Stop the search."""
         if self.search is None:
             raise ParameterError("no search was started")
         self.search.cancel()
-        return self.search.status()
+        return self.status()
 
     def result_or_none(self) -> Result | None:
         """Return the files of the last search that is done; None if there is none."""

@@ -5,6 +5,7 @@ known formats, appears in the name under which the file is kept.
 """
 
 import os
+import re
 import secrets
 import shlex
 from collections.abc import AsyncIterator, Iterable
@@ -125,11 +126,33 @@ class Uploads:
             A message, or a command for a shell if `quoted`.
         """
         for upload in self._kept.values():
-            name = shlex.quote(upload.name) if quoted else upload.name
-            text = text.replace(str(upload.path), name).replace(upload.path.name, name)
-            # names that were made of it, such as that of a report
-            text = text.replace(upload.key, upload.name.split(".")[0])
+            # the key is also in names that were made of the path, such as that of a report
+            names = {str(upload.path): upload.name, upload.path.name: upload.name}
+            for kept, name in {**names, upload.key: upload.name.split(".")[0]}.items():
+                text = in_place_of(kept, name, text, quoted=quoted)
         return text
+
+
+def in_place_of(kept: str, name: str, text: str, *, quoted: bool) -> str:
+    """Return a text with a name in place of another one; in a command, the whole word is quoted.
+
+    Parameters
+    ----------
+    kept, name
+        The name that is in the text, and the one to show.
+    text
+        A message, or a command for a shell if `quoted`.
+    quoted
+        Whether it is a command.
+
+    Examples
+    --------
+    >>> in_place_of("0f3a", "my run", "gpi report 0f3a.csv", quoted=True)
+    "gpi report 'my run.csv'"
+    """
+    if not quoted:
+        return text.replace(kept, name)
+    return re.sub(rf"{re.escape(kept)}(\S*)", lambda found: shlex.quote(name + found[1]), text)
 
 
 def shown_name(name: str) -> str:

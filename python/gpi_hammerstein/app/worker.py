@@ -1,15 +1,10 @@
-"""The process that searches; see :mod:`gpi_hammerstein.app.search`.
+"""What the process of a search does; :mod:`gpi_hammerstein_launcher.search` starts it.
 
-It reads one line of JSON, the request, and writes lines of JSON: ``{"progress": ..}`` while it works, and at
-the end ``{"done": ..}``, ``{"stopped": ..}`` or ``{"failed": ..}``. Another line on its standard input asks
-it to stop and to keep what was found. If its standard input is closed, the app has ended, and it ends at
-once.
+The answer to a request is ``{"progress": ..}`` while it works, and at the end ``{"done": ..}``,
+``{"stopped": ..}`` or ``{"failed": ..}``.
 """
 
 import json
-import os
-import signal
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -19,7 +14,6 @@ from typing import Any
 from gpi_hammerstein import files
 from gpi_hammerstein._native import Explanation, GpiError, Progress, explain
 from gpi_hammerstein.explanation import in_words, to_dict
-from gpi_hammerstein.files import temporary
 from gpi_hammerstein.held_out import rule_of
 from gpi_hammerstein.io import Recording, read_recording
 from gpi_hammerstein.json_values import plain
@@ -80,6 +74,8 @@ def work(request: dict[str, Any], stop: threading.Event, tell: Tell) -> None:
         tell({"stopped": NOTHING_KEPT})
     except GpiError as error:
         tell({"failed": {"error": type(error).__name__, "message": str(error)}})
+    except Exception as error:
+        tell({"failed": {"error": type(error).__name__, "message": f"{type(error).__name__}: {error}"}})
 
 
 def written(found: Explanation, recording: Recording, out: Path, command: str) -> dict[str, Any]:
@@ -94,61 +90,24 @@ def written(found: Explanation, recording: Recording, out: Path, command: str) -
         text = json.dumps(plain(result), allow_nan=False, indent=2)
         (folder / EXPLANATION).write_text(text + "\n", encoding="utf-8")
     model = found.model
-    return {
-        "verdict": found.verdict,
-        "effects": found.effects,
-        "interrupted": found.interrupted,
-        "sentences": list(in_words(result, unit, numbers=False)),
-        "error": result["error"],
-        "rule": rule_of(found),
-        "unit": unit,
-        "inputs": channels(model.input_names, model.input_units),
-        "outputs": channels(model.output_names, model.output_units),
-        "rate": model.rate,
-        "command": command,
-    }
+    shown: dict[str, Any] = plain(
+        {
+            "verdict": found.verdict,
+            "effects": found.effects,
+            "interrupted": found.interrupted,
+            "sentences": list(in_words(result, unit, numbers=False)),
+            "error": result["error"],
+            "rule": rule_of(found),
+            "unit": unit,
+            "inputs": channels(model.input_names, model.input_units),
+            "outputs": channels(model.output_names, model.output_units),
+            "rate": model.rate,
+            "command": command,
+        }
+    )
+    return shown
 
 
 def channels(names: list[str], units: list[str]) -> list[dict[str, str]]:
     """Return the names and units of channels."""
     return [{"name": name, "unit": unit} for name, unit in zip(names, units, strict=True)]
-
-
-def listen(read: Callable[[], bytes], stop: threading.Event) -> None:
-    """Wait for the wish to stop; end this process if the app has ended."""
-    while read():
-        stop.set()
-    temporary.abandon()
-    os._exit(1)
-
-
-def main() -> None:
-    """Answer one request."""
-    # Ctrl-C reaches all processes of a terminal. The app decides what happens, and closes the pipe.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    out = os.dup(1)
-    os.dup2(2, 1)  # what a library prints must not be taken for an answer
-    stop = threading.Event()
-    request = b""
-    while not request.endswith(b"\n"):
-        part = os.read(0, 1 << 16)
-        if not part:
-            return
-        request += part
-    # not through `sys.stdin`, which a thread that waits would lock at the exit of the interpreter
-    threading.Thread(target=listen, args=(lambda: os.read(0, 1 << 16), stop), daemon=True).start()
-
-    def tell(answer: dict[str, Any]) -> None:
-        line = json.dumps(plain(answer), allow_nan=False).encode() + b"\n"
-        while line:
-            line = line[os.write(out, line) :]
-
-    try:
-        work(json.loads(request), stop, tell)
-    except Exception as error:
-        tell({"failed": {"error": type(error).__name__, "message": str(error)}})
-        sys.exit(1)
-
-
-if __name__ == "__main__":
-    main()

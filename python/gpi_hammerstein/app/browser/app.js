@@ -251,9 +251,13 @@ function droppable(host, input, take) {
   host.addEventListener("drop", (event) => {
     event.preventDefault();
     host.classList.remove("over");
-    take([...event.dataTransfer.files]);
+    if (event.dataTransfer.files.length) take([...event.dataTransfer.files]);
   });
-  input.addEventListener("change", () => { if (input.files.length) take([...input.files]); });
+  input.addEventListener("change", () => {
+    const dropped = [...input.files];
+    input.value = ""; // so that the same file can be chosen again
+    if (dropped.length) take(dropped);
+  });
 }
 // A file that misses its place must not replace the page.
 for (const name of ["dragover", "drop"]) addEventListener(name, (event) => event.preventDefault());
@@ -276,23 +280,28 @@ async function takeRecord(dropped) {
     files = own;
     roles = null;
     for (const id of ["rate", "resample", "experiments"]) element(id).value = "";
+    element("found").hidden = true;
     await inspect();
     element("found-title").focus();
   }, "busy-record", `Reading ${dropped.map((file) => file.name).join(", ")} …`);
 }
 
 async function inspect() {
-  const mine = ++inspected;
-  element("found").hidden = true;
-  const found = await ask("/inspect", chosen());
-  if (mine !== inspected) return;
-  element("found").hidden = false;
-  await describe(found);
+  const mine = ++inspected, place = element("found");
+  place.setAttribute("aria-busy", "true");
+  element("start").disabled = true;
+  try {
+    const found = await ask("/inspect", chosen());
+    if (mine === inspected) await describe(found);
+  } finally {
+    if (mine === inspected) place.setAttribute("aria-busy", "false");
+  }
 }
 
-const again = () => attempt("record", inspect, "busy-record", "Reading …");
+const again = () => attempt("choice", inspect, "busy-choice", "Reading …");
 
 async function describe(found) {
+  element("found").hidden = false; // first, because what is hidden has no width
   const { record, problem, assumed } = found, usable = record !== null && !problem;
   element("size").textContent = `${found.files.join(", ")}: ` + (record
     ? `${record.samples} samples at ${number(record.rate_hz)} Hz, ${number(record.duration_s)} s`
@@ -302,7 +311,10 @@ async function describe(found) {
   element("resample-now").hidden = !(assumed ?? "").startsWith("--resample");
   element("findings").replaceChildren(...[...found.notes, ...found.findings].map((text) =>
     Object.assign(document.createElement("li"), { textContent: text })));
+  // the table is made anew, and the column that is being changed keeps the focus
+  const { header } = document.activeElement.dataset;
   element("columns").tBodies[0].replaceChildren(...found.columns.map(columnRow));
+  if (header) [...document.querySelectorAll("#columns select")].find((one) => one.dataset.header === header)?.focus();
   element("identifiable").tBodies[0].replaceChildren(...found.identifiable.map((one) => {
     const line = row([one.what, one.possible, one.why]);
     line.cells[1].className = "possible-" + one.possible;
