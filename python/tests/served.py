@@ -37,7 +37,10 @@ class Answer:
 
 @dataclass
 class Client:
-    """What a browser would send; every header can be replaced, and None leaves it out."""
+    """What a browser would send, with paths in the folder of the page unless they begin with a slash.
+
+    Every header can be replaced, and None leaves it out.
+    """
 
     port: int
     token: str
@@ -45,6 +48,7 @@ class Client:
     folder: Path
     session: Session
     cookies: dict[str, str] = field(default_factory=dict)
+    place: str = "/"
 
     @property
     def origin(self) -> str:
@@ -60,7 +64,8 @@ class Client:
             own["Origin"] = self.origin
         content = json.dumps(body).encode() if isinstance(body, dict) else body
         with closing(http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)) as connection:
-            connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
+            where = path if path.startswith("/") else self.place + path
+            connection.putrequest(method, where, skip_host=True, skip_accept_encoding=True)
             if isinstance(content, bytes):
                 own["Content-Length"] = str(len(content))
             elif content is not None:
@@ -86,10 +91,11 @@ class Client:
         answer = self.get(f"/?token={self.token}")
         name, value = answer.headers["Set-Cookie"].split(";")[0].split("=", 1)
         self.cookies = {name: value}
+        [self.place] = re.findall(r'url=(/[\w-]+/)"', answer.body.decode())
         return self
 
     def upload(self, path: Path) -> str:
-        answer = self.post(f"/files?name={path.name}", path.read_bytes())
+        answer = self.post(f"files?name={path.name}", path.read_bytes())
         assert answer.status == 200, answer.body
         return str(answer.json()["key"])
 
@@ -97,7 +103,7 @@ class Client:
         """The status of the search as soon as it satisfies a condition."""
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
-            status: dict[str, Any] = self.get("/state").json()["search"]
+            status: dict[str, Any] = self.get("state").json()["search"]
             if until(status):
                 return status
             time.sleep(0.02)

@@ -50,11 +50,18 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
 @pytest.fixture
 def stranger(client: Client) -> Client:
     """A client of the same server that has not opened its address."""
-    return Client(client.port, client.token, client.code, client.folder, client.session)
+    return Client(client.port, client.token, client.code, client.folder, client.session, {}, client.place)
 
 
-PATHS = [*PAGE, "/state", "/progress", "/signals/record", "/results/report.html", "/no-such-page"]
-POSTS = ["/files?name=a.csv", "/inspect", "/search", "/cancel", "/drive", "/export"]
+PATHS = [
+    *(path[1:] for path in PAGE),
+    "state",
+    "progress",
+    "signals/record",
+    "results/report.html",
+    "nothing",
+]
+POSTS = ["files?name=a.csv", "inspect", "search", "cancel", "drive", "export"]
 
 
 @pytest.mark.parametrize("path", PATHS)
@@ -62,7 +69,9 @@ def test_every_page_needs_the_cookie(path: str, client: Client, stranger: Client
     assert stranger.get(path).status == 403
     for cookie in (f"{client.origin}=x", f"gpi-app-{client.port}=", f"gpi-app-{client.port}=ö{client.token}"):
         assert stranger.get(path, Cookie=cookie).status == 403
-    if path in PAGE:
+    # the cookie alone, outside of the folder to which the browser sends it
+    assert client.get("/" + path).status == 403
+    if "/" + path in PAGE:
         assert client.get(path).status == 200
 
 
@@ -83,14 +92,14 @@ def test_every_change_needs_cookie_and_origin(path: str, client: Client, strange
 @pytest.mark.parametrize("host", ["evil.example", "localhost:{port}", "127.0.0.1", "127.0.0.1:1", None])
 def test_another_name_of_the_server_is_refused(host: str | None, client: Client) -> None:
     name = None if host is None else host.format(port=client.port)
-    for answer in (client.get("/", Host=name), client.get(f"/?token={client.token}", Host=name)):
+    for answer in (client.get("", Host=name), client.get(f"/?token={client.token}", Host=name)):
         # the server itself refuses a request without a name
         assert answer.status in ((400, 421) if host is None else (421,))
         assert "Set-Cookie" not in answer.headers
 
 
 def test_the_address_opens_the_page_and_the_code_only_once(client: Client, stranger: Client) -> None:
-    for wrong in ("/?token=", "/?token=x", f"/?code={client.token}", f"/state?token={client.token}"):
+    for wrong in ("/?token=", "/?token=x", f"/?code={client.token}", f"state?token={client.token}"):
         assert stranger.get(wrong).status == 403
     for path, status in (
         (f"/?token={client.token}", 200),
@@ -102,14 +111,16 @@ def test_the_address_opens_the_page_and_the_code_only_once(client: Client, stran
         assert answer.status == status
         if status == 200:
             # a redirection would lose a strict cookie, so the page itself goes on, without the token
-            assert b'content="0; url=/"' in answer.body and client.token.encode() not in answer.body
+            assert f'content="0; url={client.place}"' in answer.body.decode()
+            assert client.token.encode() not in answer.body and len(client.place) > 20
             words = {word.strip().lower() for word in answer.headers["Set-Cookie"].split(";")[1:]}
-            assert {"httponly", "samesite=strict"} <= words
+            # other ports of this machine do not get the cookie: their pages are not in this folder
+            assert {"httponly", "samesite=strict", f"path={client.place}".lower()} <= words
 
 
 def test_every_answer_has_a_strict_policy(client: Client, stranger: Client) -> None:
-    answers = [client.get(path) for path in PATHS] + [stranger.get("/"), client.get("/", Host="evil.example")]
-    for answer in [*answers, client.post("/inspect", {}), stranger.get(f"/?token={client.token}")]:
+    answers = [client.get(path) for path in PATHS] + [stranger.get(""), client.get("", Host="evil.example")]
+    for answer in [*answers, client.post("inspect", {}), stranger.get(f"/?token={client.token}")]:
         policy = answer.headers["Content-Security-Policy"]
         assert "default-src 'none'" in policy and "unsafe" not in policy
         assert not re.search(r"https?:|\*|blob:", policy), policy
@@ -117,7 +128,7 @@ def test_every_answer_has_a_strict_policy(client: Client, stranger: Client) -> N
         assert answer.headers["X-Content-Type-Options"] == "nosniff"
         assert answer.headers["Cache-Control"] == "no-store"
         assert answer.headers["Referrer-Policy"] == "no-referrer"
-    page = client.get("/").body.decode()
+    page = client.get("").body.decode()
     assert not re.search(r"https?://|<script(?! src)|<style| style=| on\w+=", page)
 
 
@@ -136,9 +147,9 @@ BAD = {
 @pytest.mark.parametrize("name", BAD)
 def test_a_bad_file_is_refused_with_the_message_of_the_package(name: str, client: Client) -> None:
     content, words = BAD[name]
-    answer = client.post(f"/files?name={name}", content)
+    answer = client.post(f"files?name={name}", content)
     if answer.status == 200:
-        answer = client.post("/inspect", {"files": [answer.json()["key"]]})
+        answer = client.post("inspect", {"files": [answer.json()["key"]]})
         found = answer.json()
         message = found.get("message") or found["problem"]
     else:
@@ -151,38 +162,38 @@ def test_a_bad_file_is_refused_with_the_message_of_the_package(name: str, client
 def test_names_of_files_are_not_paths(client: Client, lab: Path) -> None:
     content = (lab / "stage.csv").read_bytes()
     before = set(client.folder.rglob("*"))
-    answer = client.post("/files?name=..%2F..%2Fmy%20run.CSV", content).json()
+    answer = client.post("files?name=..%2F..%2Fmy%20run.CSV", content).json()
     [new] = set(client.folder.rglob("*")) - before
     assert answer["name"] == "my run.CSV" and re.fullmatch(r"[0-9a-f]{32}\.csv", new.name)
     assert new.parent == client.folder and new.stat().st_mode & 0o077 == 0
-    found = client.post("/inspect", {"files": [answer["key"]]}).json()
+    found = client.post("inspect", {"files": [answer["key"]]}).json()
     assert found["files"] == ["my run.CSV"]
     assert found["next"]["command"] == "gpi report 'my run.CSV' -o 'my run.html'"
     assert new.stem not in json.dumps(found)
     for keys in ([], ["x"], [str(new)], "x", None):
-        refused = client.post("/inspect", {"files": keys})
+        refused = client.post("inspect", {"files": keys})
         assert refused.status == 422 and "`files`" in refused.json()["message"]
 
 
 def test_a_file_has_a_largest_size(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GPI_MAX_UPLOAD_BYTES", "1000")
-    assert client.get("/state").json()["largest_upload"] == 1000
+    assert client.get("state").json()["largest_upload"] == 1000
     before = set(client.folder.rglob("*"))
     parts = (b"x" * 400 for _ in range(10))
     for content in (b"x" * 1001, parts):
-        answer = client.post("/files?name=big.csv", content)
+        answer = client.post("files?name=big.csv", content)
         assert answer.status == 413
         assert re.search("big.csv: has more than 1000 bytes.*GPI_MAX_UPLOAD_BYTES", answer.json()["message"])
     assert set(client.folder.rglob("*")) == before
-    assert client.post("/files?name=small.csv", b"x" * 1000).status == 200
+    assert client.post("files?name=small.csv", b"x" * 1000).status == 200
     monkeypatch.setenv("GPI_MAX_UPLOAD_BYTES", "much")
-    assert client.post("/files?name=big.csv", b"x").json()["error"] == "ParameterError"
-    assert client.post("/inspect", b"[" * (1 << 21)).status == 413
+    assert client.post("files?name=big.csv", b"x").json()["error"] == "ParameterError"
+    assert client.post("inspect", b"[" * (1 << 21)).status == 413
 
 
 @pytest.mark.parametrize("body", [b"{", b"[]", b"\xff"])
 def test_a_request_that_is_no_object_is_refused(body: bytes, client: Client) -> None:
-    assert client.post("/inspect", body).status == 400
+    assert client.post("inspect", body).status == 400
 
 
 @pytest.mark.parametrize(
@@ -195,27 +206,27 @@ def test_a_request_that_is_no_object_is_refused(body: bytes, client: Client) -> 
     ],
 )
 def test_a_wrong_choice_names_the_field(request_: dict[str, Any], words: str, client: Client) -> None:
-    answer = client.post("/inspect", {"files": ["x"], **request_})
+    answer = client.post("inspect", {"files": ["x"], **request_})
     assert answer.status == 422 and re.search(words, answer.json()["message"])
 
 
 def test_inspection_and_roles(client: Client, lab: Path, tmp_path: Path) -> None:
     key = client.upload(lab / "stage.csv")
-    found = client.post("/inspect", {"files": [key]}).json()
+    found = client.post("inspect", {"files": [key]}).json()
     direct = gpi.inspect(lab / "stage.csv").to_dict()
     for part in ("columns", "clock", "record", "inputs", "outputs", "findings", "identifiable"):
         assert found[part] == json.loads(json.dumps(direct[part])), part
-    drawn = client.get("/signals/record").json()
+    drawn = client.get("signals/record").json()
     assert [line["kind"] for line in drawn["lines"]] == ["input", "output"]
     assert drawn["lines"][0]["unit"] == "V" and len(drawn["loops"]) == 1
     # names that nobody knows: the roles are chosen, and the time stands still without a rate
     t, u, y = good_columns(1500).values()
     key = client.upload(write_csv(tmp_path / "names.csv", {"alpha": u, "beta": y, "gamma": t}))  # type: ignore[dict-item]
-    found = client.post("/inspect", {"files": [key]}).json()
+    found = client.post("inspect", {"files": [key]}).json()
     assert found["problem"] and not found["drawn"]
-    assert client.get("/signals/record").status == 422
+    assert client.get("signals/record").status == 422
     chosen = {"files": [key], "input": ["alpha"], "output": ["beta"], "covariate": [], "rate": "1000"}
-    found = client.post("/inspect", chosen).json()
+    found = client.post("inspect", chosen).json()
     assert found["problem"] is None and found["drawn"]
     assert [row["role"] for row in found["columns"]] == ["input", "output", "unused"]
 
@@ -239,7 +250,7 @@ def events(client: Client) -> list[dict[str, Any]]:
     """All events of a search."""
     with closing(http.client.HTTPConnection("127.0.0.1", client.port, timeout=60)) as connection:
         cookie = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
-        connection.request("GET", "/progress", headers={"Cookie": cookie})
+        connection.request("GET", client.place + "progress", headers={"Cookie": cookie})
         answer = connection.getresponse()
         assert answer.headers["Content-Type"].startswith("text/event-stream")
         lines = answer.read().decode().split("\n\n")
@@ -250,9 +261,9 @@ def events(client: Client) -> list[dict[str, Any]]:
 def searched(client: Client, lab: Path) -> list[dict[str, Any]]:
     """The events of a search that is complete."""
     key = client.upload(lab / "stage.csv")
-    started_ = client.post("/search", {"files": [key], "effects": ["creep"]})
+    started_ = client.post("search", {"files": [key], "effects": ["creep"]})
     assert started_.status == 200, started_.body
-    assert "is running" in client.post("/search", {"files": [key]}).json()["message"]
+    assert "is running" in client.post("search", {"files": [key]}).json()["message"]
     return events(client)
 
 
@@ -275,12 +286,12 @@ def test_the_results_are_those_of_the_package(
     client: Client, searched: list[dict[str, Any]], lab: Path
 ) -> None:
     direct = gpi.explain(gpi.read_record(lab / "stage.csv"), effects="creep")
-    assert client.get("/results/model.json?download").body.decode() == direct.model.to_json()
-    explanation = client.get("/results/explanation.json").json()
+    assert client.get("results/model.json?download").body.decode() == direct.model.to_json()
+    explanation = client.get("results/explanation.json").json()
     assert explanation["error"]["after"] == direct.after
-    saved = client.get("/results/report.html?download")
+    saved = client.get("results/report.html?download")
     assert saved.headers["Content-Disposition"] == 'attachment; filename="report.html"'
-    page = client.get("/results/report.html")
+    page = client.get("results/report.html")
     assert page.body == saved.body and b"gpi explain stage.csv --effects creep" in page.body
     policy = page.headers["Content-Security-Policy"]
     assert "sandbox allow-scripts" in policy and "allow-same-origin" not in policy
@@ -289,66 +300,66 @@ def test_the_results_are_those_of_the_package(
     assert own in policy and "'sha256-" in own and "unsafe" not in policy
     assert str(client.folder) not in page.body.decode()
     for name in ("nothing.txt", "..%2Fmodel.json", "simulated.csv%00"):
-        assert client.get(f"/results/{name}").status in (404, 422)
+        assert client.get(f"results/{name}").status in (404, 422)
 
 
 def test_another_record_is_driven_through_the_model(
     client: Client, searched: list[dict[str, Any]], lab: Path
 ) -> None:
-    model = gpi.Model.from_json(client.get("/results/model.json").body.decode())
-    answer = client.post("/drive", {"files": [client.upload(lab / "other.csv")]})
+    model = gpi.Model.from_json(client.get("results/model.json").body.decode())
+    answer = client.post("drive", {"files": [client.upload(lab / "other.csv")]})
     found, direct = answer.json(), model.compare(gpi.read_record(lab / "other.csv"))
     assert found["error"] == pytest.approx(dict(direct.error)) and found["rule"] == direct.rule
     assert found["fit_percent"] == pytest.approx(dict(direct.fit_percent))
-    kinds = [line["kind"] for line in client.get("/signals/other").json()["lines"]]
+    kinds = [line["kind"] for line in client.get("signals/other").json()["lines"]]
     assert kinds == ["input", "simulated", "output", "residual"]
-    rows = client.get("/results/simulated.csv").body.decode().splitlines()
+    rows = client.get("results/simulated.csv").body.decode().splitlines()
     assert rows[0] == "t,y" and len(rows) == 1201
     assert float(rows[600].split(",")[1]) == pytest.approx(direct.simulated[0][599, 0])
     # without an output, it is only simulated
-    found = client.post("/drive", {"files": [client.upload(lab / "drive.csv")]}).json()
+    found = client.post("drive", {"files": [client.upload(lab / "drive.csv")]}).json()
     assert found["error"] is None
-    assert [line["kind"] for line in client.get("/signals/other").json()["lines"]] == ["input", "simulated"]
+    assert [line["kind"] for line in client.get("signals/other").json()["lines"]] == ["input", "simulated"]
     # a record of another rate is refused
-    slow = client.post("/drive", {"files": [client.upload(lab / "drive.csv")], "rate": 10})
+    slow = client.post("drive", {"files": [client.upload(lab / "drive.csv")], "rate": 10})
     assert slow.status == 422 and "1000 Hz" in slow.json()["message"]
 
 
 def test_the_compensator_is_written_in_c(
     client: Client, searched: list[dict[str, Any]], tmp_path: Path
 ) -> None:
-    answer = client.post("/export", {"low": "-5", "high": 5, "precision": "double"}).json()
+    answer = client.post("export", {"low": "-5", "high": 5, "precision": "double"}).json()
     assert (
         answer["files"] == ["gpi_compensator.h", "gpi_compensator.c"]
         and "hysteresis" in answer["compensated"]
     )
-    model = gpi.Model.from_json(client.get("/results/model.json").body.decode())
+    model = gpi.Model.from_json(client.get("results/model.json").body.decode())
     gpi.export_c(model, tmp_path, limits=(-5, 5), precision="double")
     for name in answer["files"]:
-        assert client.get(f"/results/{name}").body == (tmp_path / name).read_bytes()
-    refused = client.post("/export", {"low": 5, "high": -5})
+        assert client.get(f"results/{name}").body == (tmp_path / name).read_bytes()
+    refused = client.post("export", {"low": 5, "high": -5})
     assert refused.status == 422 and refused.json()["error"] == "ParameterError"
 
 
 def test_a_search_that_is_stopped_keeps_its_model(
     client: Client, searched: list[dict[str, Any]], lab: Path
 ) -> None:
-    old = client.get("/results/model.json").body.decode()
-    assert client.post("/search", {"files": [client.upload(lab / "long.csv")]}).status == 200
+    old = client.get("results/model.json").body.decode()
+    assert client.post("search", {"files": [client.upload(lab / "long.csv")]}).status == 200
     client.wait(lambda status: status["keeps"] or status["state"] not in RUNNING)
-    assert client.post("/cancel", {}).json()["state"] == "stopping"
+    assert client.post("cancel", {}).json()["state"] == "stopping"
     status = client.wait(lambda status: status["state"] not in RUNNING)
     assert status["state"] == "done" and status["result"]["interrupted"]
     assert status["result"]["sentences"][0].startswith("The search was stopped before it was complete")
-    kept = client.get("/results/model.json").body.decode()
+    kept = client.get("results/model.json").body.decode()
     assert kept != old and gpi.Model.from_json(kept).rate == RATE
 
 
 def test_a_second_wish_ends_the_search_at_once(client: Client, lab: Path) -> None:
-    assert client.post("/search", {"files": [client.upload(lab / "long.csv")]}).status == 200
+    assert client.post("search", {"files": [client.upload(lab / "long.csv")]}).status == 200
     begin = time.monotonic()
-    assert client.post("/cancel", {}).json()["state"] == "stopping"
-    status = client.post("/cancel", {}).json()
+    assert client.post("cancel", {}).json()["state"] == "stopping"
+    status = client.post("cancel", {}).json()
     assert status["state"] == "stopped" and "ended at once" in status["message"]
     assert client.session.search is not None
     client.session.search.close()
@@ -356,7 +367,7 @@ def test_a_second_wish_ends_the_search_at_once(client: Client, lab: Path) -> Non
 
 
 def test_a_process_that_dies_is_a_message(client: Client, lab: Path) -> None:
-    assert client.post("/search", {"files": [client.upload(lab / "long.csv")]}).status == 200
+    assert client.post("search", {"files": [client.upload(lab / "long.csv")]}).status == 200
     for one in children(os.getpid()):
         if b"gpi_hammerstein_launcher.search" in Path(f"/proc/{one}/cmdline").read_bytes():
             os.kill(one, signal.SIGKILL)
@@ -418,8 +429,19 @@ def test_ctrl_c_ends_server_and_search_within_a_second(tmp_path: Path, lab: Path
         own = Client(int(port), token, "", folder, None)  # type: ignore[arg-type]
         own.enter()
         key = own.upload(lab / "long.csv")
-        assert own.post("/search", {"files": [key]}).status == 200
+        assert own.post("search", {"files": [key]}).status == 200
         own.wait(lambda status: status["progress"])
+        # a page that is closed while it listens, and one that is closed while it sends
+        for line in ("GET {}progress", "POST {}files?name=cut.csv"):
+            with closing(http.client.HTTPConnection("127.0.0.1", own.port)) as connection:
+                connection.putrequest(*line.format(own.place).split(), skip_host=True)
+                cookie = "; ".join(f"{name}={value}" for name, value in own.cookies.items())
+                for header in (f"Host: 127.0.0.1:{port}", f"Cookie: {cookie}", f"Origin: {own.origin}"):
+                    connection.putheader(*header.split(": "))
+                connection.putheader("Content-Length", "0" if line.startswith("GET") else "1000")
+                connection.endheaders(b"" if line.startswith("GET") else b"t,u")
+                time.sleep(0.2)
+        own.wait(lambda status: len([*folder.glob("*.csv")]) == 1)
         [worker] = children(process.pid)
         begin = time.monotonic()
         process.send_signal(signal.SIGINT)

@@ -1,12 +1,13 @@
 """The check of every request: it must come from the page that this run of the app has opened.
 
-Other programs and other pages can reach a port of 127.0.0.1 too. Four checks keep them out:
+Other programs and other pages can reach a port of 127.0.0.1 too. These checks keep them out:
 
 - **Host.** A page of another site can let its own name point to 127.0.0.1 (DNS rebinding). Its requests then
   have this name as `Host`, and are refused.
 - **Token.** The address that is printed contains a random token. It is exchanged for a cookie, which every
   other request must have. Scripts cannot read the cookie (`HttpOnly`), and requests that another site causes
-  do not have it (`SameSite=Strict`).
+  do not have it (`SameSite=Strict`). A browser sends a cookie also to other ports of 127.0.0.1, where another
+  user may listen. This one is therefore bound to a folder with a random name, in which all pages are.
 - **Origin.** A request that changes something must name this server as its `Origin`.
 - **Code.** The address with which the browser is started is visible to other users of the machine in the list
   of processes. It contains a code in place of the token, which is valid only once.
@@ -45,11 +46,13 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
+# Bytes of the random name of the folder: 128 bits cannot be guessed.
+PLACE_BYTES = 16
 # The cookie is `SameSite=Strict`. If the first address was opened from elsewhere, a browser does not send it
 # with a redirection, but it does if this page itself goes on.
 ENTRANCE = (
     '<!doctype html><html lang="en"><meta charset="utf-8"><title>gpi app</title>'
-    '<meta http-equiv="refresh" content="0; url=/"><p><a href="/">Continue</a>'
+    '<meta http-equiv="refresh" content="0; url={place}"><p><a href="{place}">Continue</a>'
 )
 CLOSED = (
     "This page belongs to a run of `gpi app`, and this request does not come from it. Open the address that "
@@ -82,6 +85,7 @@ class Guard:
         self.origin: str = f"http://{self.host}"
         # Cookies do not distinguish ports: two runs of the app must not take the same name.
         self.cookie: str = f"gpi-app-{port}"
+        self.place: str = f"/{secrets.token_urlsafe(PLACE_BYTES)}/"
         self._token = token
         self._codes = set(codes)
 
@@ -98,7 +102,12 @@ class Guard:
                     headers.setdefault(name, value)
             await send(message)
 
-        await (self._refusal(scope) or self.app)(scope, receive, send_with_headers)
+        answer = self._refusal(scope)
+        if answer is None:
+            own = {**scope, "path": scope["path"][len(self.place) - 1 :]}
+            await self.app(own, receive, send_with_headers)
+        else:
+            await answer(scope, receive, send_with_headers)
 
     def _refusal(self, scope: Scope) -> Response | None:
         """Return the answer to a request that does not reach the application."""
@@ -108,11 +117,13 @@ class Guard:
         if scope["path"] == "/" and scope["method"] == "GET" and scope["query_string"]:
             query = parse_qs(scope["query_string"].decode("latin-1"))
             if self._opens(query.get("token", [""])[0]) or self._opens_once(query.get("code", [""])[0]):
-                entrance = HTMLResponse(ENTRANCE)
-                entrance.set_cookie(self.cookie, self._token, httponly=True, samesite="strict")
+                entrance = HTMLResponse(ENTRANCE.format(place=self.place))
+                entrance.set_cookie(
+                    self.cookie, self._token, path=self.place, httponly=True, samesite="strict"
+                )
                 return entrance
         cookies = cookie_parser(headers.get("cookie", ""))
-        if not self._opens(cookies.get(self.cookie, "")):
+        if not scope["path"].startswith(self.place) or not self._opens(cookies.get(self.cookie, "")):
             return PlainTextResponse(CLOSED, 403)
         if scope["method"] not in ("GET", "HEAD") and headers.getlist("origin") != [self.origin]:
             return PlainTextResponse("This request comes from another page.\n", 403)

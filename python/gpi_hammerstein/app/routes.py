@@ -10,7 +10,7 @@ from typing import Any
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
@@ -85,7 +85,7 @@ def application(session: Session) -> Starlette:
         path = await run_in_threadpool(session.file, name)
         if "download" in request.query_params:
             return FileResponse(path, filename=name, media_type=OFFERED[name])
-        headers = {"Content-Security-Policy": report_policy()} if name == REPORT else {}
+        headers = report_headers() if name == REPORT else {}
         return FileResponse(path, headers=headers, media_type=OFFERED[name])
 
     posts = {
@@ -107,12 +107,14 @@ def application(session: Session) -> Starlette:
         ],
         exception_handlers={
             GpiError: lambda request, error: refusal(session, error),
+            # the page was closed while it sent something
+            ClientDisconnect: lambda request, error: Response(status_code=400),
             HTTPException: lambda request, error: JSONResponse({"message": error.detail}, error.status_code),
         },
     )
 
 
-def report_policy() -> str:
+def report_headers() -> dict[str, str]:
     """Return the policy of the report.
 
     The report is a page of its own with its own script, which its policy permits by its hash. It contains
@@ -120,7 +122,9 @@ def report_policy() -> str:
     if a text in it became a script, this script could neither reach the app nor its cookie. Only the page of
     the app may contain it in a frame.
     """
-    return f"{page_policy()}; sandbox allow-scripts allow-modals; frame-ancestors 'self'"
+    policy = f"{page_policy()}; sandbox allow-scripts allow-modals; frame-ancestors 'self'"
+    # browsers refuse to show a page in a tab that has a sandbox and isolates itself from other windows
+    return {"Content-Security-Policy": policy, "Cross-Origin-Opener-Policy": "unsafe-none"}
 
 
 def page_file(package: str, name: str, kind: str) -> Answer:

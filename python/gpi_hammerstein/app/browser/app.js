@@ -37,7 +37,7 @@ async function upload(file) {
   if (file.size > settings.largest_upload)
     throw new Error(`${file.name}: has ${file.size} bytes, more than ${settings.largest_upload}; start gpi app with a larger value of `
       + "the environment variable GPI_MAX_UPLOAD_BYTES, or use the command line");
-  return answerOf(fetch("/files?name=" + encodeURIComponent(file.name), { method: "POST", body: file }));
+  return answerOf(fetch("files?name=" + encodeURIComponent(file.name), { method: "POST", body: file }));
 }
 
 /* what is shown */
@@ -122,7 +122,7 @@ class Plots {
 
   async load() {
     const [from, to] = this.range;
-    const path = `/signals/${this.which}?experiment=${this.experiment}&from=${from}&to=${to}`;
+    const path = `signals/${this.which}?experiment=${this.experiment}&from=${from}&to=${to}`;
     this.part = await ask(path);
     const { experiments } = this.part;
     if (this.select.length !== experiments)
@@ -291,7 +291,7 @@ async function inspect() {
   place.setAttribute("aria-busy", "true");
   element("start").disabled = true;
   try {
-    const found = await ask("/inspect", chosen());
+    const found = await ask("inspect", chosen());
     if (mine === inspected) await describe(found);
   } finally {
     if (mine === inspected) place.setAttribute("aria-busy", "false");
@@ -355,7 +355,7 @@ function effects() {
 
 async function start() {
   await attempt("start", async () => {
-    follow(await ask("/search", { ...chosen(), effects: effects() }));
+    follow(await ask("search", { ...chosen(), effects: effects() }));
     element("search-title").focus();
   });
 }
@@ -372,7 +372,7 @@ function follow(status) {
   show("search");
   tell(status);
   source?.close();
-  source = new EventSource("/progress");
+  source = new EventSource("progress");
   source.addEventListener("message", (event) => tell(JSON.parse(event.data)));
   source.addEventListener("error", () => {
     if (source.readyState === EventSource.CLOSED) element("search-words").textContent = "gpi app does not answer any more.";
@@ -417,7 +417,7 @@ function showResult(result) {
   verdict.className = `verdict ${result.verdict}`;
   verdict.textContent = result.verdict;
   paragraphs(element("sentences"), result.sentences);
-  element("report").src = "/results/report.html?" + Date.now();
+  element("report").src = "results/report.html?" + Date.now();
   for (const one of document.querySelectorAll(".drive-unit"))
     one.textContent = result.inputs.length === 1 && result.inputs[0].unit ? ` [${result.inputs[0].unit}]` : "";
   element("driven").hidden = true;
@@ -441,7 +441,7 @@ async function takeOther(dropped) {
 async function driveOther() {
   if (!otherFile) throw new Error("Choose a file first.");
   element("driven").hidden = true;
-  const found = await ask("/drive", { files: [otherFile.key], input: split("other-input"), output: split("other-output"),
+  const found = await ask("drive", { files: [otherFile.key], input: split("other-input"), output: split("other-output"),
     rate: element("other-rate").value, resample: element("other-resample").value });
   element("driven").hidden = false;
   element("driven-title").textContent = `${otherFile.name}: ${found.samples} samples`;
@@ -462,14 +462,14 @@ async function makeC(event) {
   event.preventDefault();
   element("exported").replaceChildren();
   await attempt("export", async () => {
-    const found = await ask("/export", { low: element("low").value, high: element("high").value,
+    const found = await ask("export", { low: element("low").value, high: element("high").value,
       precision: element("precision").value });
     paragraphs(element("exported"), [`Compensated: ${found.compensated.join(", ")}.`,
       ...found.left.map((text) => `Not compensated: ${text}.`)]);
     const links = document.createElement("p");
     links.className = "buttons";
     for (const name of found.files)
-      links.append(Object.assign(document.createElement("a"), { className: "button", href: `/results/${name}?download`,
+      links.append(Object.assign(document.createElement("a"), { className: "button", href: `results/${name}?download`,
         download: name, textContent: `Save ${name}` }));
     element("exported").append(links);
   });
@@ -478,7 +478,7 @@ async function makeC(event) {
 /* the start */
 
 async function begin() {
-  settings = await ask("/state");
+  settings = await ask("state");
   element("some-effects").append(...Object.entries(settings.effects).map(([name, what]) => {
     const label = document.createElement("label"), words = document.createElement("span");
     words.append(name, " ", Object.assign(document.createElement("small"), { textContent: what }));
@@ -496,7 +496,7 @@ async function begin() {
   for (const one of document.querySelectorAll("input[name=effects]"))
     one.addEventListener("change", () => { element("some-effects").hidden = one.value !== "some"; });
   element("start").addEventListener("click", start);
-  element("cancel").addEventListener("click", () => attempt("search", async () => tell(await ask("/cancel", {}))));
+  element("cancel").addEventListener("click", () => attempt("search", async () => tell(await ask("cancel", {}))));
   element("again").addEventListener("click", () => attempt("other", driveOther, "busy-other", "Simulating …"));
   element("export").addEventListener("submit", makeC);
   show("record");
