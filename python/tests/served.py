@@ -136,9 +136,7 @@ def started(temporary: Path, **settings: str) -> Iterator[tuple["subprocess.Pope
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ
-        | {"PYTHONPATH": package, "TMPDIR": str(temporary), "PYTHONUNBUFFERED": "1"}
-        | settings,
+        env=os.environ | {"PYTHONPATH": package, "TMPDIR": str(temporary)} | settings,
     )
     try:
         assert process.stdout is not None

@@ -1,6 +1,7 @@
 """What one run of the app remembers: files, the search, its results, and what is drawn."""
 
 import math
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,7 @@ class Session:
         self._folder = folder
         self.uploads: Uploads = Uploads(folder)
         self.search: Search | None = None
+        self._starting = threading.Lock()
         self._searches = 0
         self._out: Path | None = None
         self._result: Result | None = None
@@ -88,6 +90,10 @@ class Session:
 
     def start(self, request: dict[str, Any]) -> dict[str, Any] | None:
         """Start a search."""
+        with self._starting:
+            return self._start(request)
+
+    def _start(self, request: dict[str, Any]) -> dict[str, Any] | None:
         if self.search is not None and self.search.is_running():
             raise ParameterError("a search is running; stop it before another one is started")
         choices = choices_from(request)
