@@ -22,7 +22,7 @@ from gpi_hammerstein.app.routes import application
 from gpi_hammerstein.app.server import listening, server_for
 from gpi_hammerstein.app.session import Session
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 
 
 @dataclass

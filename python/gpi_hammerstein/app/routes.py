@@ -28,6 +28,7 @@ PAGE = {
     "/": ("app", "browser/app.html", "text/html"),
     "/app.css": ("app", "browser/app.css", "text/css"),
     "/app.js": ("app", "browser/app.js", "text/javascript"),
+    "/plots.js": ("app", "browser/plots.js", "text/javascript"),
     "/report.css": ("report", "page.css", "text/css"),
     "/uPlot.css": ("report", "vendor/uPlot.min.css", "text/css"),
     "/uPlot.js": ("report", "vendor/uPlot.iife.min.js", "text/javascript"),
