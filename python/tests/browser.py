@@ -36,7 +36,7 @@ OPTIONS = [
 
 @contextmanager
 def opened(
-    page: Path,
+    page: Path | str,
     folder: Path,
     width: int = 1400,
     height: int = 900,
@@ -44,7 +44,7 @@ def opened(
     dark: bool = False,
     network: bool = True,
 ) -> Iterator[Any]:
-    """The driver of a browser that shows a page; its profile is in `folder`.
+    """The driver of a browser that shows a file or an address; its profile is in `folder`.
 
     Without a network, no name resolves.
     """
@@ -65,7 +65,7 @@ def opened(
         if dark:
             feature = {"name": "prefers-color-scheme", "value": "dark"}
             driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [feature]})
-        driver.get(page.as_uri())
+        driver.get(page if isinstance(page, str) else page.as_uri())
         yield driver
     finally:
         driver.quit()

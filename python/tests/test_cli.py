@@ -328,7 +328,7 @@ def test_surprises_are_one_line_with_code_1(
     def surprise(*_: object, **__: object) -> None:
         raise RuntimeError("surprise")
 
-    monkeypatch.setattr("gpi_hammerstein.cli.options.read_recording", surprise)
+    monkeypatch.setattr("gpi_hammerstein.cli.options.read_for_model", surprise)
     assert run(["identify", str(good)]) == 1
     assert "RuntimeError: surprise (GPI_DEBUG=1" in capsys.readouterr().err
     monkeypatch.setenv("GPI_DEBUG", "1")

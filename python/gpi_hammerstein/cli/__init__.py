@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from gpi_hammerstein._native import DataError, ParameterError, __version__
+from gpi_hammerstein.cli.app import app as app_command
 from gpi_hammerstein.cli.compensate import compensate
 from gpi_hammerstein.cli.datasets import datasets
 from gpi_hammerstein.cli.demo import demo
@@ -64,6 +65,7 @@ EXAMPLES: dict[Callable[..., Any], str] = {
     validate: "gpi validate model/model.json other.csv -o check",
     compensate: "gpi compensate model/model.json path.csv --limits -10,150 -o drive",
     export: "gpi export model/model.json --limits -10,150 --c compensator",
+    app_command: "gpi app",
 }
 for _command, _example in EXAMPLES.items():
     app.command(cls=Command, epilog=f"Example: {_example}")(_command)

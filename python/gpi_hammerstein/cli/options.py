@@ -1,6 +1,5 @@
 """Options that several commands share, and the functions that parse them."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -9,7 +8,8 @@ import typer
 from gpi_hammerstein import files
 from gpi_hammerstein._native import DataError, Model, ParameterError
 from gpi_hammerstein.files import require_file, require_folder
-from gpi_hammerstein.io import Recording, read_recording
+from gpi_hammerstein.io import Recording
+from gpi_hammerstein.io.for_model import read_for_model
 
 COLUMNS = "Columns"
 
@@ -168,43 +168,18 @@ def read(
     Columns that have the names of the channels of `model` are taken as these channels, unless the options
     name others.
     """
-    inputs, outputs = split_names(input), split_names(output)
-    for own_inputs, own_outputs in named_by(model, records, inputs, outputs):
-        try:
-            return read_recording(
-                list(records),
-                input=own_inputs,
-                output=own_outputs,
-                time=time,
-                rate=rate,
-                covariate=[] if covariate == ["none"] else split_names(covariate),
-                warmup=warmup,
-                resample=parse_resample(resample),
-                experiment=experiments,
-            )
-        except DataError as error:
-            # the file has other names than the model: the usual ones are tried next
-            is_last = (own_inputs, own_outputs) == (inputs, outputs)
-            if is_last or "no column `" not in str(error):
-                raise
-    raise AssertionError("the last names are those of the options")
-
-
-Names = list[str] | None
-
-
-def named_by(
-    model: Model | None, records: list[Path], inputs: Names, outputs: Names
-) -> Iterator[tuple[Names, Names]]:
-    """Yield the names of inputs and outputs to look for: those of the model first."""
-    # the outputs of a .npy file are other files
-    if model is not None and not any(file.suffix == ".npy" for file in records):
-        own_inputs = model.input_names if inputs is None else inputs
-        own_outputs = model.output_names if outputs is None else outputs
-        for pair in ((own_inputs, own_outputs), (own_inputs, outputs), (inputs, own_outputs)):
-            if pair != (inputs, outputs):
-                yield pair
-    yield inputs, outputs
+    return read_for_model(
+        model,
+        records,
+        input=split_names(input),
+        output=split_names(output),
+        time=time,
+        rate=rate,
+        covariate=[] if covariate == ["none"] else split_names(covariate),
+        warmup=warmup,
+        resample=parse_resample(resample),
+        experiment=experiments,
+    )
 
 
 def load_model(file: Path, then: str = "RECORD") -> Model:

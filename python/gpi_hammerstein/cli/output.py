@@ -1,7 +1,6 @@
 """Output of commands: messages, tables, JSON and pictures."""
 
 import json
-import math
 import signal
 import sys
 import threading
@@ -10,7 +9,6 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich.console import Console
 from rich.markup import escape as escape_markup
 from rich.table import Table
@@ -19,6 +17,7 @@ from gpi_hammerstein._native import GpiError, Record
 from gpi_hammerstein.comparison import rival_rows
 from gpi_hammerstein.escaping import visible
 from gpi_hammerstein.io import Recording
+from gpi_hammerstein.json_values import plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,23 +38,6 @@ def complain(problem: Exception | str, code: int) -> int:
         text = str(problem)
     print("gpi: " + "\n".join(map(visible, text.split("\n"))), file=sys.stderr)
     return code
-
-
-def plain(value: Any) -> Any:
-    """Convert arrays to lists, and numbers that are not finite to None, for JSON."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [plain(item) for item in value]
-    if isinstance(value, complex):
-        return [plain(value.real), plain(value.imag)]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def print_json(result: Mapping[str, Any]) -> None:

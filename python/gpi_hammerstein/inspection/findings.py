@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from gpi_hammerstein._native import DataError, Record, signs
 from gpi_hammerstein.inspection.columns import resolution
@@ -173,6 +172,9 @@ def coherence(u: Array, y: Array) -> float:
     >>> coherence(u, np.diff(u, prepend=0.0)) > 0.9
     True
     """
+    # this import takes as long as the whole package, and only an inspection needs it
+    from scipy import signal
+
     length = len(u) // SEGMENTS
     if length < SHORTEST:
         return 1.0

@@ -62,9 +62,37 @@ def limit(variable: str) -> int:
     >>> limit("GPI_MAX_READ_COLUMNS")
     1000
     """
+    return positive_integer(variable, DEFAULTS[variable])
+
+
+def positive_integer(variable: str, default: int) -> int:
+    """Return the value of an environment variable, or the default if it is not set.
+
+    Parameters
+    ----------
+    variable
+        The name of the environment variable.
+    default
+        The default.
+
+    Returns
+    -------
+    int
+        The value.
+
+    Raises
+    ------
+    ParameterError
+        The environment variable is not a positive integer.
+
+    Examples
+    --------
+    >>> positive_integer("GPI_NOT_SET", 3)
+    3
+    """
     text = os.environ.get(variable, "")
     if not text:
-        return DEFAULTS[variable]
+        return default
     if not text.isdecimal() or len(text) > 18 or int(text) == 0:
         raise ParameterError(f"`{variable}` = {text}: this environment variable must be a positive integer")
     return int(text)

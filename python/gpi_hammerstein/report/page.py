@@ -64,8 +64,7 @@ def report_html(
     units = set(record.output_units)
     unit = units.pop() if len(units) == 1 else ""
     own = components(found, errors)
-    script = '"use strict";\n' + "\n".join(text_of(name) for name in SCRIPTS)
-    style = "\n".join(text_of(name) for name in STYLES)
+    script, style = script_and_style()
     date, samples = provenance.date(), sum(len(u) for u in record.u)
     listed = "".join(f"<li>{escape(note)}</li>" for note in notes)
     return Template(text_of("page.html")).substitute(
@@ -100,6 +99,17 @@ def report_html(
         ),
         origin=origin(found, command, date, model_file),
     )
+
+
+def script_and_style() -> tuple[str, str]:
+    """Return the text of the script and of the style sheet of every page."""
+    script = '"use strict";\n' + "\n".join(text_of(name) for name in SCRIPTS)
+    return script, "\n".join(text_of(name) for name in STYLES)
+
+
+def page_policy() -> str:
+    """Return the content security policy of every page, for a server that sends it as a header."""
+    return policy(*script_and_style())
 
 
 def text_of(name: str) -> str:
