@@ -1,4 +1,4 @@
-"""`gpi export`: write a compensator as source code."""
+"""`gpi export`: write a model or its compensator as source code."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,8 +10,15 @@ from gpi_hammerstein._native import ParameterError
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import console, escape
 from gpi_hammerstein.cli.simulate import ModelFile
-from gpi_hammerstein.export import export_c, export_rust
+from gpi_hammerstein.export import export_c, export_model_c, export_model_rust, export_rust
 
+What = Annotated[
+    Literal["model", "compensator"],
+    typer.Option(
+        help="The model with its effects, which computes the output from the input, or the compensator, which "
+        "computes the drive from a reference.",
+    ),
+]
 Rust = Annotated[
     Path | None,
     typer.Option(
@@ -31,42 +38,59 @@ Limits = Annotated[
     typer.Option(
         parser=options.read_pair,
         metavar="LOW,HIGH",
-        help="Lowest and highest drive, in the unit of the input.",
+        help="Lowest and highest drive of a compensator, in the unit of the input.",
     ),
 ]
 PrecisionOption = Annotated[
     Literal["single", "double"], typer.Option(help="Number type: float and f32, or double and f64.")
 ]
-Name = Annotated[str, typer.Option(help="Prefix of the names of files, types and functions in C.")]
+Name = Annotated[
+    str | None,
+    typer.Option(
+        help="Prefix of the names of files, types and functions in C. Default: gpi_model or gpi_compensator.",
+        show_default=False,
+    ),
+]
 
 
 def export(
     model_file: ModelFile,
+    what: What = "compensator",
     rust: Rust = None,
     c: C = None,
     limits: Limits = None,
     precision: PrecisionOption = "single",
-    name: Name = "gpi_compensator",
+    name: Name = None,
 ) -> None:
-    """Write a compensator for a microcontroller, which computes the drive from a reference sample by sample.
+    """Write a model or its compensator for other programs, which run it sample by sample.
 
-    It compensates hysteresis and creep exactly. Of the dynamics it compensates only the DC gain. The code
-    needs no heap and no library. Its comments contain the hash of the model, the units and the limits.
+    The source code needs no heap and no library. Its comments contain the hash of the model, the units and the
+    limits. A compensator compensates hysteresis and creep exactly. Of the dynamics it compensates only the DC
+    gain.
     """
     if rust is None and c is None:
+        raise ParameterError(f"nothing to write: name a file (--rust {what}.rs) or a folder (--c {what})")
+    if what == "model" and limits is not None:
         raise ParameterError(
-            "nothing to write: name a file (--rust compensator.rs) or a folder (--c compensator)"
+            f"`limits` = {limits.low:g}, {limits.high:g}: only a compensator has limits; leave out --limits"
         )
     model = files.load_model(model_file)
-    written = []
-    if rust is not None:
-        compensator = export_rust(model, rust, limits=limits, precision=precision)
-        written.append(rust)
-    if c is not None:
-        compensator = export_c(model, c, limits=limits, precision=precision, name=name)
-        written += [c / f"{name}.h", c / f"{name}.c"]
+    name = name or f"gpi_{what}"
+    written = [] if rust is None else [rust]
+    written += [] if c is None else [c / f"{name}.h", c / f"{name}.c"]
     screen = console()
-    screen.print(f"Compensated: {', '.join(compensator.compensated)}.")
-    for part, why in compensator.left:
-        screen.print(f"[yellow]not compensated[/] {part}: {escape(why)}.")
+    if what == "model":
+        if rust is not None:
+            export_model_rust(model, rust, precision=precision)
+        if c is not None:
+            export_model_c(model, c, precision=precision, name=name)
+    else:
+        if rust is not None:
+            export_rust(model, rust, limits=limits, precision=precision)
+        if c is not None:
+            export_c(model, c, limits=limits, precision=precision, name=name)
+        compensator = model.compensator(limits=limits)
+        screen.print(f"Compensated: {', '.join(compensator.compensated)}.")
+        for part, why in compensator.left:
+            screen.print(f"[yellow]not compensated[/] {part}: {escape(why)}.")
     screen.print("Written: " + ", ".join(escape(str(file)) for file in written))

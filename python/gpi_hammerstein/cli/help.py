@@ -1,4 +1,4 @@
-"""Commands whose help shows a flag by its name alone, without the type of a value that it does not take."""
+"""Commands whose help is wrapped to the width of the terminal, and shows a flag without a type."""
 
 from typing import Any
 
@@ -15,8 +15,24 @@ def without_type(parameters: list[Any]) -> list[Any]:
     return parameters
 
 
+def unwrapped(text: str | None) -> str | None:
+    """Return a text whose paragraphs are single lines, so that only the terminal wraps them.
+
+    Examples
+    --------
+    >>> unwrapped("First\\nline.\\n\\nSecond.")
+    'First line.\\n\\nSecond.'
+    """
+    return text and "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
+
+
 class Command(TyperCommand):
     """A command."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Create a command; `help` may be the text of a docstring."""
+        super().__init__(*args, **options)
+        self.help = unwrapped(self.help)
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters, --help included."""

@@ -71,7 +71,7 @@ def write_json(result: Mapping[str, Any], path: Path) -> None:
 def console() -> Console:
     """Return the console for summaries."""
     screen = Console(highlight=False, soft_wrap=True)
-    if not screen.is_terminal:
+    if not screen.file.isatty():
         # A file or a pipe has no width: numbers must not be cut.
         screen.width = 120
     return screen
@@ -81,7 +81,8 @@ def console() -> Console:
 def working(what: str) -> Iterator[None]:
     """Show an activity message on stderr, if stderr is a terminal."""
     errors = Console(stderr=True)
-    with errors.status(what) if errors.is_terminal else nullcontext():
+    # `is_terminal` is also True if FORCE_COLOR is set, as in notebooks.
+    with errors.status(what) if errors.file.isatty() else nullcontext():
         yield
 
 

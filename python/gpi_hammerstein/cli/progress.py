@@ -30,7 +30,7 @@ def progress_bar(*, log: bool = False) -> Iterator[Tell | None]:
     errors = Console(stderr=True)
     if log:
         yield lines()
-    elif errors.is_terminal:
+    elif errors.file.isatty():  # `is_terminal` is also True if FORCE_COLOR is set, as in notebooks
         with bar(errors) as tell:
             yield tell
     else:
