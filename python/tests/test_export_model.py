@@ -1,6 +1,7 @@
 """Exported forward models, compiled and run, against `Model.simulate`, sample by sample."""
 
 import ctypes
+import json
 import shutil
 import subprocess
 from pathlib import Path
@@ -69,7 +70,8 @@ def in_c(folder: Path, case: Case, precision: str = "double") -> tuple[Array, in
     samples, outputs = len(case.u), len(case.model.output_names)
     y = np.zeros((samples, outputs), dtype=number)
     u, x = (np.ascontiguousarray(values, dtype=number) for values in (case.u, read(case)))
-    faults = run(u.ctypes.data_as(ctypes.c_void_p), *(a.ctypes.data_as(ctypes.c_void_p) for a in (x, y)), ctypes.c_long(samples))  # fmt: skip
+    pointers = [values.ctypes.data_as(ctypes.c_void_p) for values in (u, x, y)]
+    faults = run(*pointers, ctypes.c_long(samples))
     return y.astype(np.float64), faults
 
 
@@ -80,8 +82,6 @@ def read(case: Case) -> Array:
 
 
 def effects_of(model: gpi.Model) -> list[dict[str, object]]:
-    import json
-
     return json.loads(model.to_json()).get("effects", [])
 
 

@@ -1,4 +1,4 @@
-"""`gpi export`: write a model or its compensator as source code."""
+"""`gpi export`: write a model or its compensator for other programs."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,13 +10,22 @@ from gpi_hammerstein._native import ParameterError
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import console, escape
 from gpi_hammerstein.cli.simulate import ModelFile
-from gpi_hammerstein.export import export_c, export_model_c, export_model_rust, export_rust
+from gpi_hammerstein.export import export_c, export_fmu, export_model_c, export_model_rust, export_rust
 
 What = Annotated[
-    Literal["model", "compensator"],
+    Literal["model", "compensator"] | None,
     typer.Option(
-        help="The model with its effects, which computes the output from the input, or the compensator, which "
-        "computes the drive from a reference.",
+        help="The model with its effects, which computes the output from the input; or the compensator, "
+        "which computes the drive from a reference. Default: compensator in C and Rust, model elsewhere.",
+        show_default=False,
+    ),
+]
+Fmu = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Write an FMU for co-simulation (FMI 3.0), for example model.fmu. It needs a C compiler.",
+        callback=options.writable_file,
     ),
 ]
 Rust = Annotated[
@@ -55,40 +64,53 @@ Name = Annotated[
 
 def export(
     model_file: ModelFile,
-    what: What = "compensator",
+    what: What = None,
     rust: Rust = None,
     c: C = None,
+    fmu: Fmu = None,
     limits: Limits = None,
     precision: PrecisionOption = "single",
     name: Name = None,
 ) -> None:
     """Write a model or its compensator for other programs, which run it sample by sample.
 
-    The source code needs no heap and no library. Its comments contain the hash of the model, the units and the
-    limits. A compensator compensates hysteresis and creep exactly. Of the dynamics it compensates only the DC
-    gain.
+    The source code needs no heap and no library. Its comments contain the hash of the model, the units and
+    the limits. A compensator compensates hysteresis and creep exactly. Of the dynamics it compensates only
+    the DC gain.
     """
-    if rust is None and c is None:
-        raise ParameterError(f"nothing to write: name a file (--rust {what}.rs) or a folder (--c {what})")
-    if what == "model" and limits is not None:
+    if rust is None and c is None and fmu is None:
+        own = what or "compensator"
         raise ParameterError(
-            f"`limits` = {limits.low:g}, {limits.high:g}: only a compensator has limits; leave out --limits"
+            f"nothing to write: name a file (--rust {own}.rs, --fmu {own}.fmu) or a folder (--c {own})"
+        )
+    code, elsewhere = what or "compensator", what or "model"
+    asked = {code} if rust is not None or c is not None else set()
+    asked |= {elsewhere} if fmu is not None else set()
+    if "compensator" not in asked and limits is not None:
+        raise ParameterError(
+            f"`limits` = {limits.low:g}, {limits.high:g}: only a compensator has limits; leave out --limits, "
+            "or add --what compensator"
         )
     model = files.load_model(model_file)
-    name = name or f"gpi_{what}"
-    written = [] if rust is None else [rust]
-    written += [] if c is None else [c / f"{name}.h", c / f"{name}.c"]
-    screen = console()
-    if what == "model":
-        if rust is not None:
+    written: list[Path] = []
+    if rust is not None:
+        if code == "model":
             export_model_rust(model, rust, precision=precision)
-        if c is not None:
-            export_model_c(model, c, precision=precision, name=name)
-    else:
-        if rust is not None:
+        else:
             export_rust(model, rust, limits=limits, precision=precision)
-        if c is not None:
+        written.append(rust)
+    if c is not None:
+        name = name or f"gpi_{code}"
+        if code == "model":
+            export_model_c(model, c, precision=precision, name=name)
+        else:
             export_c(model, c, limits=limits, precision=precision, name=name)
+        written += [c / f"{name}.h", c / f"{name}.c"]
+    if fmu is not None:
+        export_fmu(model, fmu, what=elsewhere, limits=limits if elsewhere == "compensator" else None)
+        written.append(fmu)
+    screen = console()
+    if "compensator" in asked:
         compensator = model.compensator(limits=limits)
         screen.print(f"Compensated: {', '.join(compensator.compensated)}.")
         for part, why in compensator.left:
