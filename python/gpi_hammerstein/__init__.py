@@ -62,6 +62,7 @@ from gpi_hammerstein.compared import Comparison
 from gpi_hammerstein.export import (
     export_c,
     export_fmu,
+    export_mat,
     export_model_c,
     export_model_rust,
     export_rust,
@@ -111,6 +112,7 @@ __all__ = [
     "explain",
     "export_c",
     "export_fmu",
+    "export_mat",
     "export_model_c",
     "export_model_rust",
     "export_rust",

@@ -10,7 +10,15 @@ from gpi_hammerstein._native import ParameterError
 from gpi_hammerstein.cli import options
 from gpi_hammerstein.cli.output import console, escape
 from gpi_hammerstein.cli.simulate import ModelFile
-from gpi_hammerstein.export import export_c, export_fmu, export_model_c, export_model_rust, export_rust
+from gpi_hammerstein.export import (
+    SCRIPT,
+    export_c,
+    export_fmu,
+    export_mat,
+    export_model_c,
+    export_model_rust,
+    export_rust,
+)
 
 What = Annotated[
     Literal["model", "compensator"] | None,
@@ -42,6 +50,14 @@ C = Annotated[
         "--c", metavar="DIR", help="Write NAME.h and NAME.c in C99.", callback=options.writable_folder
     ),
 ]
+Mat = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Write the model for MATLAB and Octave, for example model.mat, and next to it simulate_gpi.m.",
+        callback=options.writable_file,
+    ),
+]
 Limits = Annotated[
     options.Pair | None,
     typer.Option(
@@ -68,6 +84,7 @@ def export(
     rust: Rust = None,
     c: C = None,
     fmu: Fmu = None,
+    mat: Mat = None,
     limits: Limits = None,
     precision: PrecisionOption = "single",
     name: Name = None,
@@ -78,14 +95,17 @@ def export(
     the limits. A compensator compensates hysteresis and creep exactly. Of the dynamics it compensates only
     the DC gain.
     """
-    if rust is None and c is None and fmu is None:
+    if rust is None and c is None and fmu is None and mat is None:
         own = what or "compensator"
         raise ParameterError(
-            f"nothing to write: name a file (--rust {own}.rs, --fmu {own}.fmu) or a folder (--c {own})"
+            f"nothing to write: name a folder (--c {own}) or a file (--rust {own}.rs, --fmu {what or 'model'}"
+            ".fmu, --mat model.mat)"
         )
+    if mat is not None and what == "compensator":
+        raise ParameterError("`what` = compensator: --mat writes models only; use --c, --rust or --fmu")
     code, elsewhere = what or "compensator", what or "model"
     asked = {code} if rust is not None or c is not None else set()
-    asked |= {elsewhere} if fmu is not None else set()
+    asked |= {elsewhere} if fmu is not None or mat is not None else set()
     if "compensator" not in asked and limits is not None:
         raise ParameterError(
             f"`limits` = {limits.low:g}, {limits.high:g}: only a compensator has limits; leave out --limits, "
@@ -109,6 +129,9 @@ def export(
     if fmu is not None:
         export_fmu(model, fmu, what=elsewhere, limits=limits if elsewhere == "compensator" else None)
         written.append(fmu)
+    if mat is not None:
+        export_mat(model, mat)
+        written += [mat, mat.parent / SCRIPT]
     screen = console()
     if "compensator" in asked:
         compensator = model.compensator(limits=limits)

@@ -2,6 +2,15 @@
 
 from gpi_hammerstein.export.compensator import export_c, export_rust
 from gpi_hammerstein.export.fmu import export_fmu
+from gpi_hammerstein.export.mat import SCRIPT, export_mat
 from gpi_hammerstein.export.model import export_model_c, export_model_rust
 
-__all__ = ["export_c", "export_fmu", "export_model_c", "export_model_rust", "export_rust"]
+__all__ = [
+    "SCRIPT",
+    "export_c",
+    "export_fmu",
+    "export_mat",
+    "export_model_c",
+    "export_model_rust",
+    "export_rust",
+]

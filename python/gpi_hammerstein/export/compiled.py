@@ -27,8 +27,8 @@ def platform_tuple() -> tuple[str, str]:
     system, machine = platform.system(), platform.machine()
     if system not in SYSTEMS or machine.lower() not in MACHINES:
         raise ParameterError(
-            f"`fmu`: this platform, {system} on {machine}, has no name in FMI 3.0; export the model on Linux, "
-            "macOS or Windows with a 64-bit processor"
+            f"`fmu`: this platform, {system} on {machine}, has no name in FMI 3.0; export the model on "
+            "Linux, macOS or Windows with a 64-bit processor"
         )
     name, ending = SYSTEMS[system]
     return f"{MACHINES[machine.lower()]}-{name}", ending
@@ -52,9 +52,9 @@ def compiler() -> list[str]:
         if found := shutil.which(name):
             return [found]
     raise ParameterError(
-        "`fmu`: an FMU contains a compiled library, and no C compiler was found (cc, gcc, clang). Install one, "
-        "for example with `apt install gcc`, `xcode-select --install` or `winget install LLVM.LLVM`, or set the "
-        "variable CC to its command. `--c` writes the source code without a compiler"
+        "`fmu`: an FMU contains a compiled library, and no C compiler was found (cc, gcc, clang). Install "
+        "one, for example with `apt install gcc`, `xcode-select --install` or `winget install LLVM.LLVM`, or "
+        "set the variable CC to its command. `--c` writes the source code without a compiler"
     )
 
 
@@ -76,6 +76,6 @@ def shared_library(sources: list[Path], target: Path) -> None:
     if done.returncode != 0:
         said = " ".join((done.stderr or done.stdout).split())[:300]
         raise ParameterError(
-            f"`fmu`: the C compiler `{shlex.join(command[:1])}` failed with {done.returncode}: {said}. Set the "
-            "variable CC to another compiler"
+            f"`fmu`: the C compiler `{command[0]}` failed with {done.returncode}: {said}. Set the variable "
+            "CC to another compiler"
         )

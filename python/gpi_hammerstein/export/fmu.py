@@ -81,7 +81,8 @@ def export_fmu(
     Raises
     ------
     ParameterError
-        There is no C compiler, an effect cannot be exported, limits for a model, or the file cannot be written.
+        There is no C compiler, an effect cannot be exported, limits for a model, or the file cannot be
+        written.
     DataError
         A compensator of a model of several inputs or outputs.
 
