@@ -1,9 +1,20 @@
-"""Shared by all tests: property tests repeat themselves in CI and explore elsewhere."""
+"""Shared by all tests: property tests repeat themselves in CI, and what is written is as its JSON Schema."""
 
 import os
+from collections.abc import Iterator
 
+import pytest
 from hypothesis import settings
+
+import schemas
 
 settings.register_profile("explore", deadline=None, max_examples=100)
 settings.register_profile("repeat", deadline=None, max_examples=100, derandomize=True)
 settings.load_profile("repeat" if os.environ.get("CI") else "explore")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def every_file_is_as_its_schema() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        schemas.watch(patch)
+        yield

@@ -1,0 +1,378 @@
+"""The JSON Schemas of what the commands print and write."""
+
+from schema_parts import (
+    PARAMETER,
+    Schema,
+    closed,
+    count,
+    flag,
+    listed,
+    maybe,
+    number,
+    numbers,
+    of,
+    one_of,
+    pair,
+    part,
+    size,
+    text,
+)
+
+FILES = listed(text(), "files that were written to the folder of results")
+RULE = text("how the error on held-out data is counted")
+IDENTIFIED: dict[str, Schema] = {
+    "order": count("of the dynamics"),
+    "poles": listed(part("complex")),
+    "dc_gain": listed(listed(maybe(number())), "(outputs, inputs)"),
+    "half_widths": listed(listed(size()), "of the plays of each input"),
+    "weights": listed(numbers(), "of the plays of each input"),
+    "thresholds": listed(numbers(), "of the deadzones of each input"),
+    "deadzone_weights": listed(numbers(), "of the deadzones of each input"),
+    "offsets": numbers("of each output"),
+    "delay": maybe(count("dead time in samples")),
+    "taps": maybe(count("length of the impulse responses")),
+    "excited": maybe(count("order of persistent excitation")),
+    "rounds": listed(closed({"rms": maybe(size()), "order": count(), "taps": count()})),
+    "candidates": listed(part("structure")),
+    "notes": listed(text()),
+}
+REFINED: dict[str, Schema] = {
+    "status": text("how the refinement ended"),
+    "cost_history": numbers(),
+    "residual_rms": size(),
+    "noise_floor": part("noise"),
+    "parameters": listed(part("parameter")),
+    "undetermined": listed(
+        listed(of("array", prefixItems=[text(), number()], items=False, minItems=2)),
+        "combinations of parameters that the data do not determine, with the share of each",
+    ),
+    "pole_std": listed(listed(maybe(number()), minItems=2, maxItems=2)),
+    "outliers": count(),
+    "robust": flag("whether outliers have a reduced weight"),
+}
+SPLIT = closed({"train": part("figures"), "holdout": part("figures")})
+IDENTIFICATION = closed(
+    {
+        "schema": {"const": "gpi-identification/1"},
+        "record": part("record"),
+        "holdout": text("which data were held out"),
+        **IDENTIFIED,
+        "mean_removed": flag(),
+        "start_fitted": flag(),
+        "rule": RULE,
+        "error": closed({"train": part("figures"), "holdout": maybe(part("figures"))}),
+        "rivals": part("rivals"),
+        "files": FILES,
+    },
+    REFINED,
+)
+STEP = closed(
+    {
+        "effect": maybe(text("null for the declared model")),
+        "parameters": of("object", additionalProperties=closed(PARAMETER)),
+        "evidence": closed(
+            {
+                "promised": maybe(number("what the score test promised")),
+                "deviance": maybe(number("what the effect took from the sum of squares, over its noise")),
+                "chance": maybe(number("what chance takes")),
+                "dropped": listed(text(), "effects that it replaced"),
+            }
+        ),
+        "train_rms": maybe(size()),
+        "holdout_rms": maybe(size()),
+    }
+)
+STAGE = closed(
+    {
+        "loops": listed(
+            closed(
+                {
+                    "input": text(),
+                    "output": text(),
+                    "range": pair("of the input"),
+                    "sensitivity": maybe(number()),
+                    "unit": text("of the sensitivity"),
+                    "width": maybe(number("largest opening of the loop over its travel")),
+                }
+            )
+        ),
+        "first_resonance": maybe(closed({"frequency_hz": size(), "damping": number()})),
+    }
+)
+EXPLANATION_PARTS: dict[str, Schema] = {
+    "schema": {"const": "gpi-explanation/1"},
+    "record": part("record"),
+    "noise_floor": part("noise"),
+    "effects": listed(text(), "that were found, in the order in which they were added"),
+    "steps": listed(STEP),
+    "moved_resonance": maybe(
+        listed(closed({"swing": size(), "frequency": size("Hz"), "std": size("Hz")}), minItems=2, maxItems=2)
+    ),
+    "stage": STAGE,
+    "rejected": listed(
+        closed(
+            {
+                "effect": text(),
+                "holdout_rms": maybe(size()),
+                "why": text(),
+                "confounded_with": listed(text()),
+            }
+        )
+    ),
+    "error": closed({"before": SPLIT, "after": SPLIT}),
+    "residual": closed({"structured": flag(), "tests": listed(part("test"))}),
+    "rivals": part("rivals"),
+    "verdict": one_of("explained", "partly-explained", "unattributed", "outside-class"),
+    "verdict_reason": maybe(text()),
+    "notes": listed(text()),
+    "next_experiment": maybe(part("next")),
+    "wrong_samples": listed(closed({"experiment": count(), "output": text(), "row": count()})),
+    "interrupted": flag(),
+}
+EXPLANATION = closed(EXPLANATION_PARTS, {"holdout": text(), "rule": RULE, "files": FILES})
+COUNTED: dict[str, Schema] = {
+    "model": text("file of the model"),
+    "record": part("record"),
+    "mean_removed": flag(),
+    "start_fitted": flag(),
+    "rule": RULE,
+    "skipped_s": size("s at the start of each experiment that are not scored"),
+    "files": FILES,
+}
+VALIDATION = closed(
+    {
+        "schema": {"const": "gpi-validation/1"},
+        **COUNTED,
+        "left_out": listed(text(), "effects that were left out"),
+        "error": part("figures"),
+        "residual": closed({"structured": flag(), "tests": listed(part("test"))}),
+        "figures": listed(part("left")),
+    }
+)
+SIMULATION = closed(
+    {"schema": {"const": "gpi-simulation/1"}, **COUNTED, "error": maybe(part("figures"))},
+)
+SHARES = ("inversion", "parameters", "model", "past")
+COMPENSATION = closed(
+    {
+        "schema": {"const": "gpi-compensation/1"},
+        "model": text("file of the model"),
+        "reference": text("file of the reference"),
+        "samples": count(),
+        "rate_hz": size(),
+        "lead_s": size("how long before the reference the drive begins"),
+        "drive": of(
+            "object",
+            "of each input",
+            additionalProperties=closed(
+                {
+                    "unit": text(),
+                    "lowest": number(),
+                    "highest": number(),
+                    "fastest": size("in units per s"),
+                }
+            ),
+        ),
+        "start": maybe(closed({"input": numbers(), "output": maybe(number())})),
+        "expected_error": closed(
+            {
+                "rms": maybe(size()),
+                "bound": maybe(size("of the worst sample, with a probability of 95 %")),
+                "parts": closed({name: maybe(size()) for name in SHARES}),
+                "missing": listed(one_of(*SHARES)),
+            }
+        ),
+        "error": closed({"inversion": part("figures"), "static_curve": part("figures")}),
+        "passes": listed(maybe(number()), "rms error after each pass"),
+        "out_of_reach": count("samples with the drive at a limit"),
+        "too_fast": count("samples at which the slope is limited"),
+        "compensated": listed(text()),
+        "left": listed(closed({"effect": text(), "why": text()})),
+        "files": FILES,
+    }
+)
+EXCITATION = closed(
+    {
+        "schema": {"const": "gpi-excitation/1"},
+        "kind": one_of("multisine", "prbs", "triangle", "steps"),
+        "rate_hz": size(),
+        "samples": count(),
+        "unit": text(),
+        "min": number(),
+        "max": number(),
+        "mean": number(),
+        "rms": size("about the mean"),
+        "crest_factor": maybe(size()),
+        "max_slew": size("in units per s"),
+        "file": text(),
+    },
+    {
+        "band_hz": pair(),
+        "odd": flag("whether the lines are odd"),
+        "detection": flag("whether lines are left out"),
+        "seed": count(),
+        "clock_hz": size(),
+        "frequency_hz": size(),
+    },
+)
+CLOCK = {name: count() for name in ("gaps", "backward", "repeated")}
+CLOCK_TIMES = {
+    name: number("s") for name in ("median_step_s", "smallest_step_s", "largest_step_s", "duration_s")
+}
+SIGNAL = {"name": text(), "unit": text(), "low": maybe(number()), "high": maybe(number())}
+INSPECTION = closed(
+    {
+        "schema": {"const": "gpi-inspection/1"},
+        "files": listed(text()),
+        "problem": maybe(text("why the record cannot be used as it is")),
+        "assumed": maybe(text("the option with which it was read in spite of a problem")),
+        "columns": listed(
+            closed(
+                {
+                    "header": text(),
+                    "name": text(),
+                    "unit": text(),
+                    "role": one_of("time", "input", "output", "covariate", "unused"),
+                    "why": text("why it has this role"),
+                    "low": maybe(number()),
+                    "high": maybe(number()),
+                    "step": maybe(size("the resolution")),
+                    "missing": count("samples"),
+                    "constant": flag(),
+                    "text": maybe(text("a cell that is no number")),
+                }
+            )
+        ),
+        "clock": maybe(closed(CLOCK, CLOCK_TIMES)),
+        "record": maybe(
+            closed(
+                {
+                    "samples": count(),
+                    "experiments": count(),
+                    "rate_hz": size(),
+                    "duration_s": size(),
+                    "excitation_order": maybe(count("null if it grows with the number of taps")),
+                }
+            )
+        ),
+        "inputs": listed(
+            closed(
+                {
+                    **SIGNAL,
+                    "band_hz": maybe(listed(maybe(number()), minItems=2, maxItems=2)),
+                    "swings": count(),
+                    "largest_swing": maybe(size()),
+                    "lengths": count("different lengths of swings"),
+                    "speeds": maybe(size("ratio of the fast to the slow swings")),
+                    "longest_hold_s": maybe(size()),
+                    "period_s": maybe(size()),
+                    "fed_back": flag("whether past outputs predict the input"),
+                }
+            )
+        ),
+        "outputs": listed(
+            closed(
+                {
+                    **SIGNAL,
+                    "step": maybe(size("the resolution")),
+                    "clipped": maybe(size("part of the samples at a limit while the input moves")),
+                    "noise_at_most": maybe(size()),
+                }
+            )
+        ),
+        "notes": listed(text()),
+        "findings": listed(text()),
+        "identifiable": listed(
+            closed({"what": text(), "possible": one_of("yes", "partly", "no"), "why": text()})
+        ),
+        "next": {"anyOf": [part("next"), closed({})]},
+        "next_experiment": maybe(part("next")),
+    }
+)
+DEMO = closed(
+    {
+        "schema": {"const": "gpi-demo/1"},
+        "identified": closed(IDENTIFIED, REFINED),
+        "left": part("left"),
+        "explanation": closed(EXPLANATION_PARTS),
+        "truth": of("object", "what the simulator of the record contains"),
+        "files": FILES,
+    }
+)
+RELATIVE = closed({"relative_error": maybe(size())})
+SPAN = closed({"rms_over_span": maybe(size())})
+PAPER = closed(
+    {
+        "schema": {"const": "gpi-reproduction/1"},
+        "example": {"const": "paper"},
+        "period_s": size(),
+        "poles": listed(part("complex")),
+        "zeros": listed(part("complex")),
+        "markov": numbers(),
+        "readings": listed(
+            closed(
+                {
+                    "reading": text("the convention of the deadzones"),
+                    "condition": maybe(number()),
+                    "figure_3": closed({"markov": numbers(), "relative_error": maybe(size())}),
+                    "realisations": listed(
+                        closed(
+                            {
+                                "order": count(),
+                                "poles": listed(part("complex")),
+                                "figure_4": RELATIVE,
+                                "figure_5": SPAN,
+                                "figure_6": SPAN,
+                                "inverse_truncation": maybe(size()),
+                            }
+                        )
+                    ),
+                    "refined": closed(
+                        {
+                            "relative_error": maybe(size()),
+                            "weights_error": maybe(size()),
+                            "deadzone_weights_error": maybe(size()),
+                            "undetermined": count(),
+                            "status": text(),
+                        }
+                    ),
+                }
+            )
+        ),
+        "errata": text(),
+        "files": FILES,
+    }
+)
+STEERING_MIRROR = closed(
+    {
+        "schema": {"const": "gpi-reproduction/1"},
+        "example": {"const": "fsm"},
+        "fitted_mv": listed(count()),
+        "seconds": size(),
+        "published_percent": of("object", additionalProperties=numbers()),
+        "stages": listed(
+            closed(
+                {
+                    "name": text(),
+                    "parameters": count(),
+                    "error_percent": of("object", additionalProperties=number()),
+                }
+            )
+        ),
+        "explanation": closed(EXPLANATION_PARTS),
+        "files": FILES,
+    }
+)
+REPRODUCTION: Schema = {"oneOf": [PAPER, STEERING_MIRROR]}
+DATASETS = of(
+    "object",
+    additionalProperties=closed(
+        {
+            "what": text(),
+            "parts": listed(text()),
+            "authors": text(),
+            "licence": text(),
+            "home": text("address of its page"),
+        }
+    ),
+)
