@@ -10,6 +10,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import schema_results as results  # noqa: E402
+import schema_signals as signals  # noqa: E402
 from schema_model import MODEL  # noqa: E402
 from schema_parts import Schema, all_of_file  # noqa: E402
 
@@ -21,12 +22,12 @@ SCHEMAS: dict[str, tuple[str, Schema]] = {
     "gpi-explanation/1": ("The result of `gpi explain`", results.EXPLANATION),
     "gpi-validation/1": ("The result of `gpi validate`", results.VALIDATION),
     "gpi-simulation/1": ("The result of `gpi simulate`", results.SIMULATION),
-    "gpi-compensation/1": ("The result of `gpi compensate`", results.COMPENSATION),
-    "gpi-inspection/1": ("The result of `gpi inspect`", results.INSPECTION),
-    "gpi-excitation/1": ("The result of `gpi excite`", results.EXCITATION),
+    "gpi-compensation/1": ("The result of `gpi compensate`", signals.COMPENSATION),
+    "gpi-inspection/1": ("The result of `gpi inspect`", signals.INSPECTION),
+    "gpi-excitation/1": ("The result of `gpi excite`", signals.EXCITATION),
     "gpi-demo/1": ("The result of `gpi demo`", results.DEMO),
     "gpi-reproduction/1": ("The result of `gpi reproduce`", results.REPRODUCTION),
-    "gpi-datasets": ("The result of `gpi datasets list`", results.DATASETS),
+    "gpi-datasets": ("The result of `gpi datasets list`", signals.DATASETS),
 }
 
 

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 import gpi_hammerstein as gpi
-from exported_models import CASES, EFFECTS, Array, Case, random_case, with_effects
+from exported_models import CASES, EFFECTS, Array, Case, changed, random_case, with_effects
 from gpi_hammerstein import cli
 from gpi_hammerstein.export import effects
+from test_effects import with_effect
+from test_injection import HONEST
 
 #: Of the largest output. The sums are added in another order than in the library.
 NEAR = 1e-9
@@ -164,6 +166,35 @@ def test_a_value_that_is_missing_is_the_last_one(tmp_path):
     y, faults = in_c(tmp_path, case._replace(u=bad))
     assert farthest(y, case._replace(u=held).expected) < NEAR
     assert faults == 1
+
+
+def named(texts: list[str]) -> gpi.Model:
+    """A model whose channels and covariates have these names."""
+    model = with_effects("rate-dependence", "hysteresis-shape")
+    for column, text in enumerate(texts):
+        effect = EFFECTS["covariate"] | {"column": column, "label": text}
+        model = with_effect(model, name="covariate", **effect)
+    channel = [{"name": texts[0], "unit": texts[1]}]
+    return changed(model, inputs=channel, outputs=channel)
+
+
+@needs_c
+@needs_rust
+def test_no_name_ends_a_comment(tmp_path):
+    honest = list(HONEST.values())
+    seen = []
+    for folder, texts in (("own", honest), ("plain", [f"x{i}" for i in range(len(honest))])):
+        place = tmp_path / folder
+        gpi.export_model_c(named(texts), place, name="axis")
+        flags = ["-std=c99", "-trigraphs", "-Wall", "-Wextra", "-Werror"]
+        subprocess.run(["cc", *flags, "-c", "-o", place / "axis.o", place / "axis.c"], check=True)
+        code = subprocess.run(["cc", *flags, "-E", "-P", place / "axis.c"], capture_output=True, check=True)
+        gpi.export_model_rust(named(texts), place / "axis.rs")
+        build = ["rustc", "--edition", "2024", "-D", "warnings", "--crate-type", "lib", "--out-dir", place]
+        subprocess.run([*build, place / "axis.rs"], check=True)
+        lines = (place / "axis.rs").read_text(encoding="utf-8").splitlines()
+        seen.append((code.stdout, [line for line in lines if not line.lstrip().startswith("//")]))
+    assert seen[0] == seen[1]
 
 
 def test_every_effect_of_the_catalogue_is_exported_and_another_one_is_named(monkeypatch, tmp_path):

@@ -67,7 +67,8 @@ Limits = Annotated[
     ),
 ]
 PrecisionOption = Annotated[
-    Literal["single", "double"], typer.Option(help="Number type: float and f32, or double and f64.")
+    Literal["single", "double"],
+    typer.Option(help="Number type of C and Rust: float and f32, or double and f64."),
 ]
 Name = Annotated[
     str | None,

@@ -139,6 +139,7 @@ def _interface(
 ) -> dict[str, str]:
     values = {"name": name, "NAME": name.upper(), "token": token, "rate": repr(float(rate))}
     values |= {"inputs": str(numbers[0]), "outputs": str(numbers[1]), "start_inputs": start, "held": held}
+    values["absent"] = filled("fmi3_absent.c", values, used)
     return {"fmi3.c": filled("fmi3.c", values, used)}
 
 

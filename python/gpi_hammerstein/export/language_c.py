@@ -62,6 +62,7 @@ def model_in_c(model: Model, precision: Precision, name: str) -> dict[str, str]:
     }
     values |= sizes(chain) | channels_said(chain, in_c)
     used = used_parts(chain)
+    values["operations"] = filled("operations.c", values, used)
     texts = {f"{name}.{ending}": filled(f"model.{ending}", values, used) for ending in ("h", "c")}
     return {file: without_gaps(text) for file, text in texts.items()}
 

@@ -57,7 +57,9 @@ def model_in_rust(model: Model, precision: Precision) -> str:
         "facts": "\n".join(f"//! {fact}".rstrip() for fact in facts_of(model, chain, in_rust)),
     }
     values |= sizes(chain) | channels_said(chain, in_rust)
-    return without_gaps(filled("model.rs", values, used_parts(chain)))
+    used = used_parts(chain)
+    values["operations"] = filled("operations.rs", values, used)
+    return without_gaps(filled("model.rs", values, used))
 
 
 def _hysteresis(calls: Calls, chain: Chain, place: int) -> str:
