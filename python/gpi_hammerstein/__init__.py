@@ -59,7 +59,14 @@ from gpi_hammerstein._native import (
     sensitivities,
 )
 from gpi_hammerstein.compared import Comparison
-from gpi_hammerstein.export import export_c, export_rust
+from gpi_hammerstein.export import (
+    export_c,
+    export_fmu,
+    export_mat,
+    export_model_c,
+    export_model_rust,
+    export_rust,
+)
 from gpi_hammerstein.files import load_model as load
 from gpi_hammerstein.files import save_model as save
 from gpi_hammerstein.inspection import Inspection, inspect
@@ -104,6 +111,10 @@ __all__ = [
     "era",
     "explain",
     "export_c",
+    "export_fmu",
+    "export_mat",
+    "export_model_c",
+    "export_model_rust",
     "export_rust",
     "fir",
     "fit_hysteresis",

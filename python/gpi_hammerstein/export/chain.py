@@ -1,0 +1,153 @@
+"""A model as tables and operations, which every exported form contains."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gpi_hammerstein._native import Model, ParameterError
+from gpi_hammerstein.export.effects import EXPORTED, Around
+from gpi_hammerstein.export.operations import Array, Operation, Place
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A signal outside of the model."""
+
+    name: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Hysteresis:
+    """Envelope and plays of one input."""
+
+    thresholds: Array
+    slopes: Array
+    directional: bool
+    half_widths: Array
+    weights: Array
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A model: y = H(G P[D[I(u)]] + d) + e + offset, one sample after the other."""
+
+    rate: float
+    inputs: list[Channel]
+    outputs: list[Channel]
+    #: The measured columns that effects read.
+    covariates: list[Channel]
+    #: Their places among the covariates of the record.
+    columns: list[int]
+    hysteresis: list[Hysteresis]
+    #: The matrices in one: (x(k + 1), y(k)) = system (x(k), v(k)).
+    system: Array
+    #: The states for a constant v of 1 of each input.
+    steady: Array
+    offsets: Array
+    operations: list[Operation]
+    #: Delay lines of v: input and samples, and the place in the memory.
+    lines: dict[tuple[int, int], int]
+    #: The size of the memory of all operations and delay lines.
+    memory: int
+
+    def at(self, *places: Place) -> list[Operation]:
+        """Return the operations of these places, in the order of the model."""
+        return [own for place in places for own in self.operations if own.place == place]
+
+    def first_play(self, place: int) -> int:
+        """Return the number of the first play of an input among all plays."""
+        return sum(len(own.weights) for own in self.hysteresis[:place])
+
+    @property
+    def states(self) -> int:
+        """The number of states of G."""
+        return len(self.steady)
+
+    @property
+    def kinds(self) -> set[str]:
+        """The kinds of its operations."""
+        return {own.kind for own in self.operations}
+
+
+def chain_of(model: Model) -> Chain:
+    """Return a model as tables and operations.
+
+    Raises
+    ------
+    ParameterError
+        An effect of the model cannot be exported.
+    """
+    saved = json.loads(model.to_json())
+    a, b, c, d = (
+        np.reshape(values, (rows, columns), order="F")
+        for values, rows, columns in (saved["linear"][name] for name in "abcd")
+    )
+    banks = [_hysteresis(own) for own in saved["hysteresis"]]
+    around = Around(saved["rate"], len(a), b.shape[1], [bank.half_widths for bank in banks])
+    operations = [own for effect in saved.get("effects", []) for own in _operations(effect, around)]
+    placed, lines, size = _placed(operations)
+    labels = {own.column: own.label for own in placed if own.column is not None}
+    columns = sorted(labels)
+    placed = [own if own.column is None else replace(own, column=columns.index(own.column)) for own in placed]
+    return Chain(
+        saved["rate"],
+        [Channel(**channel) for channel in saved["inputs"]],
+        [Channel(**channel) for channel in saved["outputs"]],
+        [Channel(labels[column]) for column in columns],
+        columns,
+        banks,
+        np.block([[a, b], [c, d]]),
+        _steady(a, b),
+        np.array(saved["offsets"]),
+        placed,
+        lines,
+        size,
+    )
+
+
+def _hysteresis(own: dict[str, Any]) -> Hysteresis:
+    envelope, plays = own["envelope"], own["plays"]
+    return Hysteresis(
+        np.array(envelope["thresholds"], dtype=np.float64),
+        np.array(envelope["weights"], dtype=np.float64),
+        envelope["reading"] == "directional",
+        np.array(plays["half_widths"], dtype=np.float64),
+        np.array(plays["weights"], dtype=np.float64),
+    )
+
+
+def _operations(effect: dict[str, Any], around: Around) -> list[Operation]:
+    name = effect["name"]
+    if name not in EXPORTED:
+        raise ParameterError(
+            f"the effect `{name}` of the model cannot be exported: it has no form that is computed sample by "
+            f"sample in another language. Export the model without it, or simulate it with `gpi simulate`"
+        )
+    return EXPORTED[name](effect, around)
+
+
+def _placed(operations: Sequence[Operation]) -> tuple[list[Operation], dict[tuple[int, int], int], int]:
+    """Give each operation and each delay line its place in the memory."""
+    size = 0
+    placed = []
+    for number, own in enumerate(operations):
+        placed.append(replace(own, number=number, first=size))
+        size += own.memory
+    lines: dict[tuple[int, int], int] = {}
+    for own in operations:
+        if own.late > 0 and (own.channel, own.late) not in lines:
+            lines[own.channel, own.late] = size
+            size += own.late
+    return placed, lines, size
+
+
+def _steady(a: Array, b: Array) -> Array:
+    """Return (I - A)^-1 B, or zeros where an integrator has no steady state."""
+    try:
+        return np.asarray(np.linalg.solve(np.eye(len(a)) - a, b), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return np.zeros_like(b)
