@@ -24,7 +24,8 @@ pytestmark = needs_browser
 DROP = """
 const transfer = new DataTransfer();
 transfer.items.add(new File(["no record"], arguments[1]));
-arguments[0].dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, bubbles: true, cancelable: true }));
+const dropped = { dataTransfer: transfer, bubbles: true, cancelable: true };
+arguments[0].dispatchEvent(new DragEvent("drop", dropped));
 """
 
 
