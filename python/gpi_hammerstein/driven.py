@@ -8,7 +8,7 @@ from gpi_hammerstein._native import DataError, Model, Record
 from gpi_hammerstein.io import Recording
 from gpi_hammerstein.io.recording import Run
 
-__all__ = ["require_match", "simulated_table"]
+__all__ = ["require_match", "simulated_runs", "simulated_table", "table_of"]
 
 
 def require_match(model: Model, recording: Recording) -> None:
@@ -44,10 +44,15 @@ def simulated_table(model: Model, recording: Recording, start: Record | None = N
     `start` is the record of the same experiments, if their initial states are to be fitted to its outputs.
     """
     if start is None:
-        simulated = [simulated_run(model, run) for run in recording.runs]
+        simulated = simulated_runs(model, recording)
     else:
         residuals = model.residual(start, fit_start=True)
         simulated = [measured - residual for measured, residual in zip(start.y, residuals, strict=True)]
+    return table_of(model, recording, simulated)
+
+
+def table_of(model: Model, recording: Recording, simulated: list[NDArray[np.float64]]) -> pl.DataFrame:
+    """Return the time of all experiments and their outputs, which are already simulated."""
     several = len(model.output_names) > 1
     names = [f"y{index + 1}" for index in range(len(model.output_names))] if several else ["y"]
     frames = []
@@ -59,6 +64,11 @@ def simulated_table(model: Model, recording: Recording, start: Record | None = N
             columns = {"experiment": np.full(len(run.u), number), **columns}
         frames.append(pl.DataFrame(columns))
     return pl.concat(frames)
+
+
+def simulated_runs(model: Model, recording: Recording) -> list[NDArray[np.float64]]:
+    """Return the simulated outputs of all experiments, each from a steady state."""
+    return [simulated_run(model, run) for run in recording.runs]
 
 
 def simulated_run(model: Model, run: Run) -> NDArray[np.float64]:

@@ -20,6 +20,15 @@ from served import PATIENCE, started
 pytestmark = needs_browser
 
 
+# What a browser does if a file is dropped.
+DROP = """
+const transfer = new DataTransfer();
+transfer.items.add(new File(["no record"], arguments[1]));
+const dropped = { dataTransfer: transfer, bubbles: true, cancelable: true };
+arguments[0].dispatchEvent(new DragEvent("drop", dropped));
+"""
+
+
 def until(driver: Any, condition: Any) -> None:
     from selenium.webdriver.support.ui import WebDriverWait
 
@@ -58,8 +67,7 @@ def test_from_an_own_record_to_the_c_file(tmp_path: Path) -> None:
         until(driver, lambda: driver.find_elements("id", "file") and see("view-record").is_displayed())
         assert re.fullmatch(re.escape(address.split("?")[0]) + r"[\w-]+/", driver.current_url)  # no token
         # a wrong file is refused with a message on the page
-        (tmp_path / "notes.docx").write_text("no record")
-        see("file").send_keys(str(tmp_path / "notes.docx"))
+        driver.execute_script(DROP, see("drop"), "notes.docx")
         until(driver, lambda: see("error-record").is_displayed())
         assert see("error-record").text.startswith("notes.docx: no known format")
         # the record: the page says what is missing, and the user chooses

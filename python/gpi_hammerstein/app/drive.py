@@ -8,10 +8,10 @@ import numpy as np
 from gpi_hammerstein import files
 from gpi_hammerstein._native import Model, residual_tests
 from gpi_hammerstein.app.choices import Choices
-from gpi_hammerstein.app.signals import Channel, Signals
+from gpi_hammerstein.app.signals import Array, Channel, Signals
 from gpi_hammerstein.app.uploads import Uploads
 from gpi_hammerstein.compared import compare
-from gpi_hammerstein.driven import require_match, simulated_table
+from gpi_hammerstein.driven import require_match, simulated_runs, table_of
 from gpi_hammerstein.explanation import failed_in_words
 from gpi_hammerstein.io import Recording
 from gpi_hammerstein.io.for_model import read_for_model
@@ -66,24 +66,21 @@ def drive(model: Model, uploads: Uploads, choices: Choices, out: Path) -> tuple[
         "rule": "from the steady state at the first input",
         "sentences": [],
     }
-    start = None
     if recording.outputs:
-        start = recording.record()
-        comparison = compare(model, start)
-        model = comparison.model
-        residual = residual_tests(model, start, fit_start=True)
+        record = recording.record()
+        comparison = compare(model, record)
+        model, simulated = comparison.model, comparison.simulated
+        residual = residual_tests(model, record, fit_start=True)
         found |= {
             "error": plain(comparison.error),
             "fit_percent": plain(comparison.fit_percent),
             "rule": comparison.rule,
             "sentences": [*failed_in_words(residual["tests"]), verdict(residual["structured"])],
         }
-    table = simulated_table(model, recording, start)
+    else:
+        simulated = simulated_runs(model, recording)
     with files.staged(out) as folder:
-        table.write_csv(folder / SIMULATED, float_precision=None)
-    names = [name for name in table.columns if name not in ("t", "experiment")]
-    ends = np.cumsum([len(run.u) for run in recording.runs])[:-1]
-    simulated = np.split(table.select(names).to_numpy(), ends)
+        table_of(model, recording, simulated).write_csv(folder / SIMULATED, float_precision=None)
     return found, signals(model, recording, simulated)
 
 
@@ -93,7 +90,7 @@ def verdict(structured: bool) -> str:
     return f"The residual {has}."
 
 
-def signals(model: Model, recording: Recording, simulated: list[np.ndarray]) -> Signals:
+def signals(model: Model, recording: Recording, simulated: list[Array]) -> Signals:
     """Return what is drawn: inputs, measured and simulated outputs, and their difference."""
     inputs = [Channel(column.name, column.unit, "input") for column in recording.inputs]
     own = list(zip(model.output_names, model.output_units, strict=True))
@@ -101,7 +98,8 @@ def signals(model: Model, recording: Recording, simulated: list[np.ndarray]) -> 
     if recording.outputs:
         channels += [Channel(name, unit, kind) for kind in ("output", "residual") for name, unit in own]
     values = []
-    for run, y in zip(recording.runs, simulated, strict=True):
+    for run, own_simulated in zip(recording.runs, simulated, strict=True):
+        y = own_simulated.reshape(len(run.u), -1)
         columns = [run.u, y]
         if recording.outputs:
             columns += [run.y, run.y - y]
