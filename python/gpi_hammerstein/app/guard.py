@@ -52,7 +52,8 @@ PLACE_BYTES = 16
 # with a redirection, but it does if this page itself goes on.
 ENTRANCE = (
     '<!doctype html><html lang="en"><meta charset="utf-8"><title>gpi app</title>'
-    '<link rel="icon" href="data:,"><meta http-equiv="refresh" content="0; url={place}"><p><a href="{place}">Continue</a>'
+    '<link rel="icon" href="data:,">'
+    '<meta http-equiv="refresh" content="0; url={place}"><p><a href="{place}">Continue</a>'
 )
 CLOSED = (
     "This page belongs to a run of `gpi app`, and this request does not come from it. Open the address that "
