@@ -192,7 +192,8 @@ pub(super) fn force(
     state.refused.retain(|one| one.effect != entry.name);
     let best = scored_beside(state, &state.point, &[entry], progress)?.into_iter().next();
     let Some(best) = best else {
-        let requirement = "the record does not show where or at which frequency to add it; do not require it";
+        let requirement =
+            "the record does not show where or at which frequency to add it; do not require it";
         return Err(Error::parameter("require", entry.name, requirement));
     };
     let trial = as_trial(progress, ("trials", entry.name), (0, 1), |progress| {

@@ -152,9 +152,17 @@ impl StateSpace {
         states.map_or_else(|| DVector::zeros(self.order()), |x| x.column(0).into_owned())
     }
 
-    /// The solutions X of `X = A X + driven`; `None` for a pole at z = 1.
+    /// The solutions X of `X = A X + driven`; `None` for a pole at z = 1, up to rounding.
     fn steady_states(&self, driven: &Matrix) -> Option<Matrix> {
-        solve(Matrix::identity(self.order(), self.order()) - &self.a, driven)
+        let order = self.order();
+        if order == 0 {
+            return Some(driven.clone());
+        }
+        let difference = Matrix::identity(order, order) - &self.a;
+        let rounding = order as f64 * f64::EPSILON * difference.amax();
+        let decomposed = difference.lu();
+        let is_singular = decomposed.u().diagonal().amin() <= rounding;
+        if is_singular { None } else { decomposed.solve(driven) }
     }
 
     /// The first `count` Markov parameters `H_0 = D`, `H_j = C A^(j-1) B`, each (outputs, inputs).
@@ -236,6 +244,20 @@ mod tests {
             let sum: f64 = (0..=k).map(|lag| markov[lag][0] * input[k - lag]).sum();
             assert!((sum - output[k]).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn an_integrator_starts_at_zero() {
+        // poles at 1 and 0.4; rounding leaves the matrix regular
+        let a = Matrix::from_row_slice(2, 2, &[1.4, 1.0, -0.4, 0.0]);
+        let b = Matrix::from_row_slice(2, 1, &[1.0, 0.5]);
+        let c = Matrix::from_row_slice(1, 2, &[1.0, 0.0]);
+        let integrator = StateSpace::new(a, b, c, Matrix::zeros(1, 1)).unwrap();
+        let input = DVector::from_element(1, 3.0);
+        assert_eq!(integrator.equilibrium(&input), DVector::zeros(2));
+        let still = example().equilibrium(&input);
+        let next = &example().a * &still + &example().b * &input;
+        assert!((next - still).amax() < 1e-12);
     }
 
     #[test]
