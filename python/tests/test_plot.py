@@ -194,7 +194,7 @@ def test_history_ends_at_the_residual_above_the_floor(model: gpi.Model) -> None:
 
 def test_a_loaded_model_has_no_bands_and_says_so(record: gpi.Record, model: gpi.Model) -> None:
     loaded = gpi.Model.from_json(model.to_json())
-    assert "not from identify" in gpi.plot.candidates(loaded).texts[0].get_text()
+    assert "only models that `identify` returns" in gpi.plot.candidates(loaded).texts[0].get_text()
     assert "do not contain" in gpi.plot.history(loaded).texts[0].get_text()
     assert not gpi.plot.markov(loaded).collections
     assert not gpi.plot.loop(record.u[0], record.y[0], loaded).collections
