@@ -23,7 +23,8 @@ pub struct OutputNonlinearity {
 
 impl OutputNonlinearity {
     pub(super) const NAME: &'static str = "output-nonlinearity";
-    pub(super) const WHAT: &'static str = "a static curve after the dynamics, such as that of a sensor";
+    pub(super) const WHAT: &'static str =
+        "a static curve after the dynamics, such as that of a sensor";
     pub(super) const SYNONYMS: &'static [&'static str] = &[
         "sensor curve",
         "sensor nonlinearity",
