@@ -216,7 +216,7 @@ mod tests {
     #[test]
     fn the_command_makes_the_input_that_is_asked_for() {
         let next = confused("drift", "creep");
-        assert!(next.why.contains("hold the input still"), "{}", next.why);
+        assert!(next.why.contains("keep the input constant"), "{}", next.why);
         assert!(next.command.starts_with("gpi excite steps --rate 1000 --duration 600 --range "));
         let range = next.command.split("--range ").nth(1).unwrap().split(' ').next().unwrap();
         assert!(range.split(',').all(|end| end.trim_start_matches('-').len() <= 6), "{range}");
