@@ -43,7 +43,7 @@ impl AmplifierSlew {
     /// explains any error of the response to a jump, whatever its cause.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const QUANTILES: [f64; 10] = [0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 0.9995];
-        // By hand: as many as there are blocks of held-out time, of which each then contains one.
+        // By hand: with fewer exceedances than blocks of held-out time, some blocks cannot test the limit.
         const EXCEEDANCES: usize = 10;
         let rate = situation.record.rate();
         let limits = |input| {
