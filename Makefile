@@ -17,17 +17,30 @@ NATIVE_MISSING := $(if $(wildcard python/gpi_hammerstein/_native*.so),,FORCE)
 heading = @printf '\n== %s ==\n' '$(1)'
 
 .DEFAULT_GOAL := help
-# `make test` always runs its checks in the same order, also with `make -j`.
-.NOTPARALLEL:
-.PHONY: help demo test lint lint-rust lint-python test-rust test-python test-slow bench bench-peers bench-scale docs notebooks figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam kill-writes fuzz-readers fuzz-models miri reliability clean FORCE
+.PHONY: help programs demo test compile-rust lint lint-rust lint-python test-rust test-python test-slow bench bench-peers bench-scale docs notebooks figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam kill-writes fuzz-readers fuzz-models miri reliability clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
 
+programs:
+	@command -v cargo >/dev/null || \
+		{ echo "error: cargo not found: install Rust 1.89 or newer" >&2; exit 1; }
+	@command -v $(PYTHON) >/dev/null || \
+		{ echo "error: $(PYTHON) not found: install Python 3.11 or newer, or select one with 'make PYTHON=...'" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "error: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or newer is required: select one with 'make PYTHON=...'" >&2; exit 1; }
+
 demo: $(NATIVE) ## Run `gpi demo` and write its pictures to out/demo
 	$(BIN)/gpi demo -o out/demo
 
-test: $(TOOLS) lint-rust test-rust lint-python test-python ## Run all checks and tests
+# Two at a time where one does not fill both cores. The tests of Python run alone, because some measure waiting times.
+together = +@$(MAKE) --no-print-directory -j2
+
+test: programs ## Run all checks and tests
+	$(together) $(TOOLS) lint-rust
+	$(together) compile-rust
+	$(together) test-rust lint-python
+	$(together) test-python
 
 lint: lint-rust lint-python ## Run the format, lint and type checks of both languages
 
@@ -36,6 +49,11 @@ lint-rust: ## Run rustfmt and clippy
 	cargo fmt --all --check -- $(EFFECTS)
 	$(call heading,Rust: lint)
 	PYO3_PYTHON=$(PYTHON) cargo clippy --release --workspace --all-targets -- -D warnings
+
+# What the wheel and the tests share is compiled beside the tests, not before them.
+compile-rust:
+	$(call heading,Rust: compile)
+	PYO3_PYTHON=$(PYTHON) cargo test --release --workspace --exclude benches --no-run
 
 test-rust: ## Build for firmware; run unit tests and documentation tests
 	$(call heading,Rust: build without std for $(FIRMWARE))
@@ -47,7 +65,7 @@ test-rust: ## Build for firmware; run unit tests and documentation tests
 	$(call heading,Rust: tests)
 	PYO3_PYTHON=$(PYTHON) cargo test --release --workspace --exclude benches
 	$(call heading,Rust: tests without default features)
-	cargo test -p gpi-core --no-default-features
+	cargo test --release -p gpi-core --no-default-features
 
 lint-python: $(NATIVE) ## Run ruff, mypy, basedpyright and stubtest
 	$(call heading,Python: lint and format)
@@ -132,18 +150,14 @@ clean: ## Remove the environment, all builds and all caches
 	rm -f python/gpi_hammerstein/_native*.so
 	find python benches -name __pycache__ -type d -prune -exec rm -rf {} +
 
-$(TOOLS): pyproject.toml
+# Order only: a check makes nothing out of date.
+$(TOOLS): pyproject.toml | programs
 	$(call heading,Python: environment)
-	@command -v cargo >/dev/null || \
-		{ echo "error: cargo not found: install Rust 1.89 or newer" >&2; exit 1; }
-	@command -v $(PYTHON) >/dev/null || \
-		{ echo "error: $(PYTHON) not found: install Python 3.11 or newer, or select one with 'make PYTHON=...'" >&2; exit 1; }
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-		{ echo "error: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or newer is required: select one with 'make PYTHON=...'" >&2; exit 1; }
 	@[ -x $(BIN)/python ] || $(PYTHON) -m venv $(VENV) || \
 		{ rm -rf $(VENV); echo "error: the virtual environment cannot be created (Debian, Ubuntu: install python3-venv)" >&2; exit 1; }
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --group dev
+	# modules are compiled when they are first imported: compiling all of them takes longer than installing them
+	$(BIN)/python -m pip install --quiet --no-compile --group dev
 	@touch $@
 
 $(NATIVE): $(TOOLS) $(NATIVE_SOURCES) $(NATIVE_MISSING)

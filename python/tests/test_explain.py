@@ -56,7 +56,7 @@ def test_a_missing_effect_is_named(name, strength):
         assert found.before["train"]["rms"] > 1.1 * found.after["train"]["rms"]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+@pytest.mark.parametrize("seed", [1, 2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (3, 4))])
 def test_a_clean_record_lacks_nothing(seed):
     plant, found = explained(seed, (), None)
     assert found.effects == []
@@ -79,7 +79,7 @@ def test_a_hum_is_no_mode_that_rings_on(frequency, amplitude):
     assert values["amplitude"] == pytest.approx(amplitude, rel=0.05)
 
 
-@pytest.mark.parametrize("channel", ["u", "y"])
+@pytest.mark.parametrize("channel", ["u", pytest.param("y", marks=pytest.mark.slow)])
 def test_a_column_that_repeats_a_channel_is_no_effect(channel):
     # the reference of an amplifier or of a control loop, or a second sensor
     run = plants.draw(2, ("creep",), 15.0, SECONDS, RATE).record(0)

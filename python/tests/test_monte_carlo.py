@@ -36,7 +36,12 @@ def test_estimates_reach_the_cramer_rao_bound():
 
 @pytest.mark.parametrize("quantity", ["parameters", "markov", "magnitude", "loop"])
 @pytest.mark.parametrize(
-    ("noise", "robust"), [(trials.white, None), (trials.coloured, None), (trials.white, True)]
+    ("noise", "robust"),
+    [
+        (trials.coloured, None),
+        pytest.param(trials.white, None, marks=pytest.mark.slow),
+        pytest.param(trials.white, True, marks=pytest.mark.slow),
+    ],
 )
 def test_intervals_hold_the_truth(noise, robust, quantity):
     inside = getattr(found(noise, robust), quantity).inside()
