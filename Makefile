@@ -14,6 +14,9 @@ NATIVE := $(VENV)/.native-installed
 NATIVE_SOURCES := pyproject.toml Cargo.toml $(wildcard Cargo.lock crates/*/Cargo.toml) $(shell find crates/*/src)
 NATIVE_MISSING := $(if $(wildcard python/gpi_hammerstein/_native*.so),,FORCE)
 
+# Modules are compiled when they are first imported, which some environments switch off.
+unexport PYTHONDONTWRITEBYTECODE
+
 heading = @printf '\n== %s ==\n' '$(1)'
 
 .DEFAULT_GOAL := help
@@ -156,7 +159,7 @@ $(TOOLS): pyproject.toml | programs
 	@[ -x $(BIN)/python ] || $(PYTHON) -m venv $(VENV) || \
 		{ rm -rf $(VENV); echo "error: the virtual environment cannot be created (Debian, Ubuntu: install python3-venv)" >&2; exit 1; }
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	# modules are compiled when they are first imported: compiling all of them takes longer than installing them
+	# compiling every module takes longer than installing it
 	$(BIN)/python -m pip install --quiet --no-compile --group dev
 	@touch $@
 
