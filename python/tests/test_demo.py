@@ -94,6 +94,7 @@ def test_the_record_is_made_again_exactly(tmp_path: Path, monkeypatch: pytest.Mo
     np.testing.assert_allclose(again, bundled, rtol=0, atol=1.5e-4)
 
 
+@pytest.mark.slow
 def test_its_first_part_is_inverted_though_nothing_lies_just_above_rest() -> None:
     """The envelope that fits best falls between rest and the next sample, where it was not measured."""
     whole = gpi.read_record(DATA / "demo.csv.gz")

@@ -88,6 +88,7 @@ def test_a_column_that_repeats_a_channel_is_no_effect(channel):
     assert found.effects == ["creep"]
 
 
+@pytest.mark.slow
 def test_loops_that_open_with_speed_are_fitted_on_grids_that_move():
     # without it, what the grid has bent to is taken for a shape of the loops
     plant, found = explained(8024, ("rate-dependence",), 20.0)
