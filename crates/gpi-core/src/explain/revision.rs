@@ -104,8 +104,10 @@ fn without(
     Ok(if is_better { anew } else { refitted })
 }
 
-/// Replaces a slow function of time, which can fit much, by an effect that the input drives and that explains as much.
-pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+/// Replaces a slow function of time, which can fit much, by an effect that the input drives and that explains as much;
+/// says whether there was any.
+pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    let mut is_replaced = false;
     let is_slow = |entry: &Entry| entry.signature == Signature::SlowInTime;
     let driven: Vec<&'static Entry> =
         state.setup.allowed.iter().copied().filter(|own| own.driven && !is_slow(own)).collect();
@@ -143,9 +145,12 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
             let dropped = vec![slow.name];
             state.point = trial.point.clone();
             state.add(Addition { trial, others: Vec::new(), dropped })?;
+            // the grids were placed, and the effect's terms counted, beside the slow function
+            state.is_rich = false;
+            is_replaced = true;
         }
     }
-    Ok(())
+    Ok(is_replaced)
 }
 
 /// Replaces a slow function of time by one that acts elsewhere where that explains more, now that the rest is known.

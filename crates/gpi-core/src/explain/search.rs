@@ -15,14 +15,16 @@ use crate::effects::{Entry, FreeOrder, Signature, Stage};
 use crate::fit::minimize::Fitted;
 use crate::progress::{Progress, as_trial, reached};
 
-/// Adds effects until nothing more is confirmed and all that was named passes the last examination.
+/// Adds effects until nothing more is confirmed and all that was named passes the last examination. An effect that
+/// replaces another one at the end of a round may need more terms, or leave room for more effects, so that the search
+/// goes on.
 pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
     reached(progress, "score test", (state.cost / state.prepared.values()).sqrt())?;
     for _ in 0..state.setup.policy.revision.rounds {
         add_effects(state, progress)?;
-        prefer_driven(state, progress)?;
+        let is_replaced = prefer_driven(state, progress)?;
         exchange_slow(state, progress)?;
-        if !examine_all(state, progress)? {
+        if !examine_all(state, progress)? && !is_replaced {
             break;
         }
     }
