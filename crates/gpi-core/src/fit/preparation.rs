@@ -250,3 +250,33 @@ pub(crate) fn rescale(point: &mut Point) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Channel;
+    use crate::operators::Reading;
+
+    #[test]
+    fn held_out_ranges_end_where_they_did_and_begin_after_the_warm_up() {
+        // plays of half-width 1 have touched both bounds after half a period of this sine, in motion from the start
+        let u: Vec<f64> = (0..400).map(|k| 2.0 * (0.1 * f64::from(k + 5)).sin()).collect();
+        let mut run =
+            Experiment::new(Matrix::from_vec(400, 1, u.clone()), Matrix::from_vec(400, 1, u));
+        run.held_out = vec![0..4, 6..60, 200..250];
+        let (inputs, outputs) = (vec![Channel::new("u", "V")], vec![Channel::new("y", "um")]);
+        let record = Record::new(vec![run], 100.0, inputs, outputs, vec![]).unwrap();
+        let channel = Parameters {
+            reading: Reading::OneSided,
+            thresholds: vec![0.0],
+            slopes: vec![1.0],
+            half_widths: vec![0.0, 1.0],
+            weights: vec![1.0, 0.5],
+        };
+        let prepared = Prepared::new(&record, vec![channel]).unwrap();
+        let own = &prepared.record.experiments()[0];
+        assert!((7..40).contains(&own.warmup), "{}", own.warmup);
+        assert_eq!(own.held_out, [own.warmup..60, 200..250]);
+        assert!(own.scored_runs().flatten().all(|k| !(0..60).contains(&k)));
+    }
+}

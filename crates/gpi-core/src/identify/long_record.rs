@@ -24,10 +24,11 @@ pub(crate) fn compare(
     let Some(stretches) = excerpt(prepared.given, &prepared.settings.excerpt)? else {
         return compare_on_all(prepared, options, fast, progress);
     };
-    let mut part = prepare(&stretches, options)?;
-    let compared = compare_on_all(&mut part, options, fast, progress);
+    let compared = prepare(&stretches, options).and_then(|mut part| {
+        compare_on_all(&mut part, options, fast, progress).map(|compared| (part, compared))
+    });
     // stretches that show too little, such as an impulse response of rank 0, leave the whole record to try
-    let Ok(mut compared) = Error::unless_interrupted(compared)? else {
+    let Ok((part, mut compared)) = Error::unless_interrupted(compared)? else {
         return compare_on_all(prepared, options, fast, progress);
     };
     let point = carried(&compared.refined.fitted.point, &part, prepared);
