@@ -15,11 +15,11 @@
 //! in the steady state of v(0); at the end of the warm-up the unknown part of the initial state is added to x. The dead
 //! time of L samples drives G by `v(max(k - L, 0))`.
 
+use super::forward::hats;
 use super::motion::Motion;
 use super::plays::Plays;
 use super::point::{Past, Point};
 use super::stages::Stages;
-use super::stream::hats;
 use crate::chain::hysteresis::Parameters;
 use crate::effects::{ClosedLoops, InnerLoop, PlayCurves, Stage};
 use crate::linear::{Section, Sections};

@@ -55,6 +55,7 @@
 pub(crate) mod adjoint;
 pub(crate) mod bounds;
 mod effect_columns;
+mod forward;
 pub(crate) mod free_run;
 pub(crate) mod hysteresis;
 pub(crate) mod injections;

@@ -23,7 +23,7 @@ pub enum Slope {
 }
 
 /// An effect between the displacement and the reading.
-pub trait OutputStage: Block {
+pub trait OutputStage: Block + Sync {
     /// The output channel.
     fn output(&self) -> usize;
 

@@ -3,7 +3,7 @@
 use crate::effects::block::Block;
 
 /// An effect by which the half-widths of the plays depend on the speed of the drive.
-pub trait PlayWidths: Block {
+pub trait PlayWidths: Block + Sync {
     /// The input channel whose hysteresis it changes.
     fn input(&self) -> usize;
 
@@ -36,7 +36,7 @@ impl PlayRead {
 }
 
 /// An effect that reads the plays through curves: a play F contributes `curve(F)` instead of F.
-pub trait PlayCurves: Block {
+pub trait PlayCurves: Block + Sync {
     /// The input channel whose hysteresis it changes.
     fn input(&self) -> usize;
 
