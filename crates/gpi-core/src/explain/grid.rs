@@ -16,9 +16,11 @@ use crate::chain::free_run::Signals;
 use crate::chain::point::Point;
 use crate::effects::Stage;
 use crate::fit::minimize::FitOptions;
+use crate::parallel::install;
 use crate::progress::{Progress, report};
 use crate::{Error, Experiment, Matrix};
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 /// A play or a deadzone that an input's hysteresis may get.
 #[derive(Clone, Copy)]
@@ -98,9 +100,10 @@ fn enriched(state: &SearchState) -> Result<(Point, usize), Error> {
             let point = place.added_to(base.point, policy.probe);
             Ok(point.output_from(Stage::Plays, known, experiment, index)? - here)
         };
-        places.iter().map(column).collect()
+        install(|| places.par_iter().map(column).collect())
     };
-    let Projection { mut left, mut score, squares, cost } = base.project(places.len(), &columns)?;
+    let Projection { mut left, mut score, squares, cost } =
+        base.project(&[places.len()], &columns)?;
     let values = prepared.values();
     // two numbers of a play, priced as in the BIC
     let least = (2.0 * values.ln() / values).max(policy.least) * cost;

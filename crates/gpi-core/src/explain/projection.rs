@@ -38,7 +38,7 @@ type Columns<'a> = &'a dyn Fn(&Signals, &Matrix, &Experiment, usize) -> Result<V
 
 /// Columns without what the model's sensitivities can express.
 pub(crate) struct Projection {
-    /// `C' (I - Q) C`, (columns, columns).
+    /// `C' (I - Q) C`, (columns, columns); known within each group of columns only.
     pub left: Matrix,
     /// `C' (I - Q) e`.
     pub score: DVector<f64>,
@@ -49,9 +49,11 @@ pub(crate) struct Projection {
 }
 
 impl Base<'_> {
-    /// Projects n columns. `columns` makes them for an experiment from its signals, its output and its index.
-    pub(crate) fn project(&self, n: usize, columns: Columns) -> Result<Projection, Error> {
+    /// Projects columns in groups of so many, each a candidate of its own. `columns` makes them for an experiment from
+    /// its signals, its output and its index.
+    pub(crate) fn project(&self, groups: &[usize], columns: Columns) -> Result<Projection, Error> {
         let unknowns = self.table.len;
+        let n = groups.iter().sum();
         let mut cross = Matrix::zeros(unknowns, n);
         let mut squares = Matrix::zeros(n, n);
         let mut with_residual = DVector::zeros(n);
@@ -78,7 +80,14 @@ impl Base<'_> {
                         column.component_mul_assign(&weights);
                     }
                     cross.gemm(1.0, regressor, &weighted, 1.0);
-                    squares.gemm_tr(1.0, &own, &weighted, 1.0);
+                    let mut begin = 0;
+                    for &size in groups {
+                        let (own, weighted) =
+                            (own.columns(begin, size), weighted.columns(begin, size));
+                        let mut among = squares.view_mut((begin, begin), (size, size));
+                        among.gemm_tr(1.0, &own, &weighted, 1.0);
+                        begin += size;
+                    }
                     with_residual.gemv_tr(1.0, &weighted, &residual, 1.0);
                 }
                 first += count;
@@ -183,7 +192,7 @@ mod tests {
             let gained = |probe: &Effect| point.gained_by(probe, known, here, own, index);
             candidate.probes.iter().map(gained).collect()
         };
-        let expected = base.project(candidate.probes.len(), &columns).unwrap();
+        let expected = base.project(&[candidate.probes.len()], &columns).unwrap();
         for i in 0..candidate.probes.len() {
             let size = expected.squares[i];
             assert!(size > 0.0);

@@ -78,13 +78,13 @@ fn score(base: &Base, candidates: &[Proposal<Effect>]) -> Result<Vec<Score>, Err
     {
         return Ok(vec![scored(candidate, 0, &projection)]);
     }
-    let probes = candidates.iter().map(|candidate| candidate.probes.len()).sum();
+    let probes: Vec<usize> = candidates.iter().map(|candidate| candidate.probes.len()).collect();
     let columns = |known: &Signals, here: &Matrix, experiment: &Experiment, index: usize| {
         let of = |candidate| columns(base, candidate, known, here, experiment, index);
         let columns: Result<Vec<_>, Error> = install(|| candidates.par_iter().map(of).collect());
         Ok(columns?.into_iter().flatten().collect())
     };
-    let projection = base.project(probes, &columns)?;
+    let projection = base.project(&probes, &columns)?;
     let mut first = 0;
     let place = |candidate: &Proposal<Effect>| {
         first += candidate.probes.len();
