@@ -89,6 +89,14 @@ def test_a_column_that_repeats_a_channel_is_no_effect(channel):
 
 
 @pytest.mark.slow
+def test_a_slew_limit_that_few_jumps_show_is_named_where_it_explains_all():
+    plant = plants.draw(8011, ("amplifier-slew",), None, 20.0)
+    found = gpi.explain(record_of(plant.record(0)))
+    assert found.effects == ["amplifier-slew"]
+    assert found.after["holdout"]["rms"] < 1.1 * plant.noise_std
+
+
+@pytest.mark.slow
 def test_loops_that_open_with_speed_are_fitted_on_grids_that_move():
     # without it, what the grid has bent to is taken for a shape of the loops
     plant, found = explained(8024, ("rate-dependence",), 20.0)

@@ -53,4 +53,4 @@ def loops(
 
 def title(found: Explanation) -> str:
     """Return a title that lists the added effects."""
-    return f"Added: {', '.join(found.effects)}" if found.effects else "No effect added"
+    return f"Added effects: {', '.join(found.effects)}" if found.effects else "No effect added"

@@ -39,12 +39,9 @@ impl AmplifierSlew {
     pub(super) const IS_EXPANSION: bool = false;
 
     /// Limits at quantiles of the record's steps: an amplifier that is slower than most of the steps is seen
-    /// without a search. A drive that exceeds a limit a few times only, such as in single jumps, does not show one: a limit
-    /// explains any error of the response to a jump, whatever its cause.
+    /// without a search.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const QUANTILES: [f64; 10] = [0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 0.9995];
-        // By hand: with fewer exceedances than blocks of held-out time, some blocks cannot test the limit.
-        const EXCEEDANCES: usize = 10;
         let rate = situation.record.rate();
         let limits = |input| {
             let steps = situation.steps(input);
@@ -54,9 +51,7 @@ impl AmplifierSlew {
                 .collect();
             limits.dedup();
             let largest = steps.last().copied().unwrap_or(0.0);
-            limits.retain(|&limit| {
-                limit < largest && situation.exceedances(input, limit) >= EXCEEDANCES
-            });
+            limits.retain(|&limit| limit < largest);
             limits.into_iter().map(move |step| Proposal::finite(Self { input, limit: step * rate }))
         };
         situation.inputs().flat_map(limits).collect()

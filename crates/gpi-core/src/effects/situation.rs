@@ -65,15 +65,4 @@ impl Situation<'_> {
         steps.sort_by(f64::total_cmp);
         steps
     }
-
-    /// How many times a drive is faster than a step a sample, for one sample or several in a row.
-    pub(crate) fn exceedances(&self, input: usize, step: f64) -> usize {
-        let of = |drive: &Matrix| {
-            let column = drive.column(input);
-            let pairs = column.iter().zip(column.iter().skip(1));
-            let is_faster: Vec<bool> = pairs.map(|(a, b)| (b - a).abs() > step).collect();
-            is_faster.chunk_by(|a, b| a == b).filter(|run| run[0]).count()
-        };
-        self.drives.iter().map(of).sum()
-    }
 }

@@ -120,6 +120,8 @@ pub(super) enum Refusal {
     Gaps,
     /// Too large a part of the output for a model that is far from the noise.
     TooLarge,
+    /// It acts on too few occasions for a model that is far from the noise.
+    TooRare,
     /// The model without it, fitted from where the trial ended, explains as much.
     LongerFit,
     /// Another effect explains as much.
@@ -146,6 +148,9 @@ impl Refusal {
             Self::Gaps => "predicts the output between its knots much worse than it fits the samples at the knots".to_owned(),
             Self::TooLarge => {
                 "would add a large part of the output, but the error of the model would still be far above the noise".to_owned()
+            }
+            Self::TooRare => {
+                "acts a few times only in this record, and the error of the model would still be far above the noise".to_owned()
             }
             Self::LongerFit => "reduces the error no more than a longer fit of the model without it".to_owned(),
             Self::Confounded => format!("explains as much as {taken}"),

@@ -8,23 +8,26 @@
 //! `size = min over a, b of rms(c - a y - b) / std(y)`.
 //!
 //! How the half-widths of plays depend on speed is a correction of the hysteresis. It is never named while the model is
-//! far from the noise, because then the hysteresis itself is another.
+//! far from the noise, because then the hysteresis itself is another. Nor is a limit of the input's speed that the input
+//! exceeds a few times only, such as in single jumps: such a limit explains any error of the response to a jump,
+//! whatever its cause.
 //!
 //! Lines and measured columns are not asked, because no misfit resembles them, nor are modes, loops and shapes of loops,
 //! which may well be a large part.
 
 use super::contribution::contribution;
-use crate::Error;
 use crate::chain::point::Point;
 use crate::effects::{FreeOrder, Place, Signature};
+use crate::explain::judgement::Refusal;
 use crate::explain::state::SearchState;
+use crate::{Error, Experiment, Record};
 
-/// Whether the effect at a place of a point is large and its model is far from the noise on what is held out.
-pub(super) fn is_too_large(
+/// Why an effect whose model is far from the noise on what is held out is not named: it is large, or acts too rarely.
+pub(super) fn doubt(
     state: &SearchState,
     point: &Point,
     place: usize,
-) -> Result<bool, Error> {
+) -> Result<Option<Refusal>, Error> {
     let entry = point.effects[place].entry();
     let of = point.effects[place].place();
     let is_asked = matches!(
@@ -36,14 +39,36 @@ pub(super) fn is_too_large(
             | Place::Added(_)
     );
     if !is_asked || entry.signature == Signature::Unique || entry.free_order == FreeOrder::JoinsG {
-        return Ok(false);
+        return Ok(None);
     }
     let policy = &state.setup.policy.examination;
     let test = state.setup.test.scored().max(1) as f64;
     let trained = state.prepared.record.scored().max(1) as f64;
     let noise = state.noise_squares()? / trained;
     let is_near = state.held_out(point)?.iter().sum::<f64>() / test <= policy.near.powi(2) * noise;
-    Ok(!is_near && (matches!(of, Place::Widths(_)) || size(state, point, place)? > policy.large))
+    if is_near {
+        Ok(None)
+    } else if exceedances(&of, &state.prepared.record).is_some_and(|n| n < policy.exceedances) {
+        Ok(Some(Refusal::TooRare))
+    } else if matches!(of, Place::Widths(_)) || size(state, point, place)? > policy.large {
+        Ok(Some(Refusal::TooLarge))
+    } else {
+        Ok(None)
+    }
+}
+
+/// How many times the input is faster than an input stage passes unchanged, for one sample or several in a row; `None`
+/// for what has no such limit.
+fn exceedances(place: &Place, record: &Record) -> Option<usize> {
+    let Place::Input(stage) = place else { return None };
+    let most = stage.fastest() / record.rate();
+    let of = |experiment: &Experiment| {
+        let column = experiment.input.column(stage.input());
+        let pairs = column.iter().zip(column.iter().skip(1));
+        let is_faster: Vec<bool> = pairs.map(|(a, b)| (b - a).abs() > most).collect();
+        is_faster.chunk_by(|a, b| a == b).filter(|run| run[0]).count()
+    };
+    most.is_finite().then(|| record.experiments().iter().map(of).sum())
 }
 
 /// The largest size over the outputs.
@@ -72,4 +97,28 @@ fn size(state: &SearchState, point: &Point, place: usize) -> Result<f64, Error> 
         (own.max(0.0) / output).sqrt()
     };
     Ok(sums.iter().map(of).fold(0.0, f64::max))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::{AmplifierSlew, Effect};
+    use crate::{Channel, Matrix};
+
+    #[test]
+    fn jumps_exceed_a_limit_once_each() {
+        // three steps of 5, one of them over two samples, and slopes of 1 between
+        let u = vec![0.0, 5.0, 5.0, 6.0, 1.0, 1.0, 2.0, 7.0, 12.0, 13.0];
+        let (u, y) = (Matrix::from_vec(10, 1, u.clone()), Matrix::from_vec(10, 1, u));
+        let channels = (vec![Channel::new("u", "V")], vec![Channel::new("y", "um")]);
+        let run = Experiment::new(u, y);
+        let record = Record::new(vec![run.clone(), run], 10.0, channels.0, channels.1, vec![]);
+        let record = record.unwrap();
+        let count = |limit| {
+            let slew = Effect::from(AmplifierSlew { input: 0, limit });
+            exceedances(&slew.place(), &record)
+        };
+        assert_eq!(count(20.0), Some(6));
+        assert_eq!(count(51.0), Some(0));
+    }
 }
