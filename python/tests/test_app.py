@@ -450,6 +450,6 @@ def test_ctrl_c_ends_server_and_search_within_a_second(tmp_path: Path, lab: Path
             time.sleep(0.01)
         assert time.monotonic() - begin < 1.0
         assert process.stderr is not None
-        last_words = process.stderr.read()
-        assert "the app has ended" in last_words and "Traceback" not in last_words
+        # the browser may have saved what it was sent
+        assert process.stderr.read() == "gpi: interrupted\n"
         assert list(tmp_path.iterdir()) == []

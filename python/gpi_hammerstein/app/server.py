@@ -17,7 +17,7 @@ from gpi_hammerstein.app.routes import application
 from gpi_hammerstein.app.session import Session
 from gpi_hammerstein.app.settings import largest_upload
 from gpi_hammerstein.files.exchange import recover
-from gpi_hammerstein.files.temporary import sweep, temporary_folder
+from gpi_hammerstein.files.temporary import note_written, sweep, temporary_folder
 
 # Bytes of the token: 256 bits cannot be guessed.
 TOKEN_BYTES = 32
@@ -62,6 +62,8 @@ def serve(*, open_browser: bool, say: Callable[[str], object] = print) -> None:
         port = own.getsockname()[1]
         token, code = secrets.token_urlsafe(TOKEN_BYTES), secrets.token_urlsafe(TOKEN_BYTES)
         guard = Guard(application(session), port, token, [code])
+        # from now on the browser may save results, which this process does not see
+        note_written()
         say(f"{guard.origin}/?token={token}")
         if open_browser:
             # a browser without windows would keep this thread

@@ -100,9 +100,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return complain(error, WRONG_CALL)
     except DataError as error:
         return complain(error, UNUSABLE_DATA)
-    except (KeyboardInterrupt, typer.Abort) as end:
-        # Typer turns what a command raises into an Abort
-        return complain(str(end.__cause__ or end) or "interrupted; nothing was written", INTERRUPTED)
+    except (KeyboardInterrupt, typer.Abort):
+        return complain("interrupted; nothing was written", INTERRUPTED)
     except BrokenPipeError:
         # The reader of the pipe was closed: redirect the interpreter's last flush to nowhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -34,7 +34,4 @@ def app(
         screen.print(f"The app is at {escape(address)}")
         screen.print("Press Ctrl-C to end it.")
 
-    try:
-        serve(open_browser=browser, say=say)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt("the app has ended; what was not downloaded is removed") from None
+    serve(open_browser=browser, say=say)
