@@ -51,6 +51,7 @@ def page_data(found: Explanation, errors: Errors) -> str:
                 "held_out": errors.held_out[k] if errors.held_out else [],
                 "largest": [errors.largest(k, output) for output in outputs],
                 "limits": [usual(errors, k, output) for output in outputs],
+                "spans": [span(errors, k, output) for output in outputs],
                 "parts": own,
             }
             for k, own in enumerate(parts(errors))
@@ -70,3 +71,12 @@ def usual(errors: Errors, experiment: int, output: int) -> float:
     mask = errors.scored(experiment, output)
     sizes = np.abs(errors.before[experiment][mask, output])
     return MARGIN * float(np.quantile(sizes, USUAL)) + 1e-300 if len(sizes) else 1.0
+
+
+def span(errors: Errors, experiment: int, output: int) -> list[float]:
+    """Return the limits of the output's axis: simulated samples that are not scored do not determine them."""
+    y = errors.record.y[experiment][:, output]
+    mask = errors.scored(experiment, output)
+    before, after = (y - left[experiment][:, output] for left in (errors.before, errors.after))
+    shown = np.concatenate([y, before[mask], after[mask]])
+    return [float(shown.min()), float(shown.max())]

@@ -22,12 +22,14 @@ class Group {
       this.clipped = this.isWhole() && (low < -limit || high > limit);
       return this.clipped ? [Math.max(low, -limit), Math.min(high, limit)] : [low, high];
     };
+    const [lowest, highest] = experiment.spans[o];
+    const within = (low, high) => this.isWhole() ? [Math.max(low, lowest), Math.min(high, highest)] : [low, high];
     const add = (id, options) => {
       const host = document.getElementById(id);
       this.charts.push(new TimeChart(host, this, options));
     };
     add("chart-output", { title: `${name}: measured, and simulated before and after`, label: labelled(name, unit),
-      lines: outputs, band, height: narrow ? 230 : 270 });
+      lines: outputs, band, height: narrow ? 230 : 270, range: within });
     add("chart-detail", { title: "The part with the largest error after", label: labelled(name, unit), lines: outputs, band,
       height: narrow ? 230 : 270, detail: this.largest() });
     // the band is that of the measured output around the simulated one
