@@ -15,7 +15,7 @@ use crate::{Error, Experiment, Matrix};
 use std::ops::Range;
 use std::sync::mpsc::sync_channel;
 
-/// Blocks of an experiment that pay for a second thread, whose start takes as long as a part of a block.
+/// Blocks of an experiment that pay for another thread, whose start takes as long as a part of a block.
 const PARALLEL: usize = 8;
 
 /// Blocks by which the simulation may be ahead: their traces stay in the cache.
@@ -85,15 +85,19 @@ impl<'a> Stream<'a> {
         self
     }
 
+    /// Whether the experiment is too short to pay for another thread.
+    pub(crate) fn is_short(&self) -> bool {
+        self.forward.scored_blocks().len() < PARALLEL
+    }
+
     /// Hands the rows of all scored samples on.
     pub(crate) fn run(
         &mut self,
         consume: &mut dyn FnMut(Rows) -> Result<(), Error>,
     ) -> Result<(), Error> {
+        let is_short = self.is_short();
         let Self { forward, behind } = self;
-        let blocks = forward.scored_blocks();
-        let is_short = blocks.len() < PARALLEL;
-        let mut traces = blocks.map(|first| forward.pass(first));
+        let mut traces = forward.scored_blocks().map(|first| forward.pass(first));
         if is_short {
             return behind.run(&mut traces, consume);
         }
