@@ -207,6 +207,8 @@ impl Arrow {
 pub(crate) struct ArrowSolver<'a> {
     arrow: &'a Arrow,
     eliminated: Vec<Option<Eliminated>>,
+    /// `H - sum_e W_e' W_e` of the eliminated groups, (shared, shared).
+    reduced: Matrix,
 }
 
 /// A group whose free unknowns are eliminated.
@@ -222,13 +224,15 @@ struct Eliminated {
 
 impl<'a> ArrowSolver<'a> {
     pub(crate) fn new(arrow: &'a Arrow) -> Self {
-        Self { arrow, eliminated: arrow.groups.iter().map(|_| None).collect() }
+        let eliminated = arrow.groups.iter().map(|_| None).collect();
+        Self { arrow, eliminated, reduced: arrow.head.clone() }
     }
 
     /// The solution of `A x = b` over some unknowns, with all others at zero; `None` where the matrix of these
     /// unknowns is not positive definite.
     pub(crate) fn solve(&mut self, b: &Vector, is_free: &[bool]) -> Option<Vector> {
         let Arrow { shared, head, groups, .. } = self.arrow;
+        let mut is_reduced = true;
         let free = |unknowns: &[usize]| -> Vec<usize> {
             (0..unknowns.len()).filter(|&at| is_free[unknowns[at]]).collect()
         };
@@ -236,7 +240,13 @@ impl<'a> ArrowSolver<'a> {
             let free = free(&group.unknowns);
             if kept.as_ref().is_none_or(|kept| kept.free != free) {
                 *kept = Some(group.eliminate(free)?);
+                is_reduced = false;
             }
+        }
+        if !is_reduced {
+            // from H each time, so that rounding errors do not add up
+            self.reduced.copy_from(head);
+            self.eliminated.iter().flatten().for_each(|own| self.reduced -= &own.product);
         }
         let known = || groups.iter().zip(self.eliminated.iter().flatten());
         let mut rest = DVector::from_fn(shared.len(), |i, _| b[shared[i]]);
@@ -248,12 +258,7 @@ impl<'a> ArrowSolver<'a> {
             right.push(own);
         }
         let at = free(shared);
-        let mut reduced = select(head, &at, &at);
-        if at.len() == shared.len() {
-            known().for_each(|(_, own)| reduced -= &own.product);
-        } else {
-            known().for_each(|(_, own)| reduced -= select(&own.product, &at, &at));
-        }
+        let reduced = select(&self.reduced, &at, &at);
         let target = rest.select_rows(&at);
         let solution = if reduced.nrows() > LARGE {
             solve_positive(&reduced, &target)?
