@@ -10,8 +10,8 @@ from plants import textbook
 pytestmark = pytest.mark.slow
 
 SEEDS = (1000, 1001)
-# A slew limit explains the responses to four jumps.
-MORE = [("maxwell-slip", 1009)]
+# A slew limit explains the responses to four jumps; a sensor's curve a part of what a motor integrates.
+MORE = [("maxwell-slip", 1009), ("motor", 3002)]
 # Records with a false name today, and what it is.
 KNOWN: dict[tuple[str, int], str] = {}
 

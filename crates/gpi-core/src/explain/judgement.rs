@@ -120,6 +120,8 @@ pub(super) enum Refusal {
     Gaps,
     /// Too large a part of the output for a model that is far from the noise.
     TooLarge,
+    /// It resembles a misfit of the hysteresis, and the model is far from the noise.
+    TooFar,
     /// It acts on too few occasions for a model that is far from the noise.
     TooRare,
     /// The model without it, fitted from where the trial ended, explains as much.
@@ -148,6 +150,9 @@ impl Refusal {
             Self::Gaps => "predicts the output between its knots much worse than it fits the samples at the knots".to_owned(),
             Self::TooLarge => {
                 "would add a large part of the output, but the error of the model would still be far above the noise".to_owned()
+            }
+            Self::TooFar => {
+                "acts like a misfit of the hysteresis, and the error of the model would still be far above the noise".to_owned()
             }
             Self::TooRare => {
                 "acts a few times only in this record, and the error of the model would still be far above the noise".to_owned()

@@ -8,9 +8,10 @@
 //! `size = min over a, b of rms(c - a y - b) / std(y)`.
 //!
 //! How the half-widths of plays depend on speed is a correction of the hysteresis. It is never named while the model is
-//! far from the noise, because then the hysteresis itself is another. Nor is a limit of the input's speed that the input
-//! exceeds a few times only, such as in single jumps: such a limit explains any error of the response to a jump,
-//! whatever its cause.
+//! far from the noise, because then the hysteresis itself is another. Nor is an effect of the output stage, such as a
+//! sensor's curve: it depends on the position, as every misfit of the hysteresis does. Nor is a limit of the input's speed
+//! that the input exceeds a few times only, such as in single jumps: such a limit explains any error of the response to a
+//! jump, whatever its cause.
 //!
 //! Lines and measured columns are not asked, because no misfit resembles them, nor are modes, loops and shapes of loops,
 //! which may well be a large part.
@@ -50,7 +51,9 @@ pub(super) fn doubt(
         Ok(None)
     } else if exceedances(&of, &state.prepared.record).is_some_and(|n| n < policy.exceedances) {
         Ok(Some(Refusal::TooRare))
-    } else if matches!(of, Place::Widths(_)) || size(state, point, place)? > policy.large {
+    } else if matches!(of, Place::Widths(_) | Place::Output(_)) {
+        Ok(Some(Refusal::TooFar))
+    } else if size(state, point, place)? > policy.large {
         Ok(Some(Refusal::TooLarge))
     } else {
         Ok(None)
