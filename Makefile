@@ -53,7 +53,7 @@ lint-rust: ## Run rustfmt and clippy
 	$(call heading,Rust: lint)
 	PYO3_PYTHON=$(PYTHON) cargo clippy --release --workspace --all-targets -- -D warnings
 
-# What the wheel and the tests share is compiled beside the tests, not before them.
+# First of all, because cargo makes the build of the wheel wait for that of the tests, or the other way round.
 compile-rust:
 	$(call heading,Rust: compile)
 	PYO3_PYTHON=$(PYTHON) cargo test --release --workspace --exclude benches --no-run

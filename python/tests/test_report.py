@@ -7,6 +7,7 @@ import re
 from html.parser import HTMLParser
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -18,6 +19,7 @@ from gpi_hammerstein.explanation import to_dict
 from gpi_hammerstein.report import notebook, packing, provenance, report_html, series
 from gpi_hammerstein.report.components import components
 from gpi_hammerstein.report.curves import classes
+from gpi_hammerstein.report.data import span
 from gpi_hammerstein.report.quality import facts
 from records import RATE, actuator, drive, good_columns, write_csv
 
@@ -282,6 +284,17 @@ def test_notebooks_show_tables(found):
     assert "linear part" in found.model._repr_html_() and "damping" in found.model._repr_html_()
     assert "1000 Hz" in found.record._repr_html_()
     assert notebook.record(found.record) == found.record._repr_html_()
+
+
+def test_simulated_samples_that_are_not_scored_do_not_stretch_the_axis():
+    y = np.array([[1.0], [2.0], [3.0], [2.0]])
+    errors = SimpleNamespace(
+        record=SimpleNamespace(y=[y]),
+        before=[np.array([[900.0], [0.0], [-0.5], [0.0]])],
+        after=[np.array([[-900.0], [0.25], [0.0], [1.5]])],
+        scored=lambda experiment, output: np.array([False, True, True, True]),
+    )
+    assert span(errors, 0, 0) == [0.5, 3.5]
 
 
 def test_the_command_writes_a_page(tmp_path, capsys, monkeypatch):

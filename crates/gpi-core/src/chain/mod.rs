@@ -20,7 +20,7 @@
 //! and of the output stage. [`tangents`] carries the changes of eight unknowns forward side by side; [`adjoint`]
 //! carries the cost's sensitivities backward, at the price of one more simulation whatever the number of unknowns (A.
 //! Griewank and A. Walther, *Evaluating Derivatives*, 2008). The tangent and the adjoint of a place stand beside its
-//! value. [`stream`] drives all three through an experiment, block by block.
+//! value. [`forward`] records what both need, and [`stream`] drives all three through an experiment, block by block.
 //!
 //! The unknowns are the rows of one [`table`], from which values, steps, [`bounds`], [`names`] and injections follow.
 //!

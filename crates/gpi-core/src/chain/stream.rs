@@ -15,10 +15,10 @@ use crate::{Error, Experiment, Matrix};
 use std::ops::Range;
 use std::sync::mpsc::sync_channel;
 
-/// Blocks of an experiment that pay for another thread, whose start takes as long as a part of a block.
+/// Blocks of an experiment that pay for another thread, whose start takes as long as a part of a block. By hand.
 const PARALLEL: usize = 8;
 
-/// Blocks by which the simulation may be ahead: their traces stay in the cache.
+/// Blocks by which the simulation may be ahead: their traces stay in the cache. By hand.
 const AHEAD: usize = 2;
 
 /// Residuals and derivatives of a run of scored samples of one experiment.

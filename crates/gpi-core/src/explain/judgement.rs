@@ -121,7 +121,7 @@ pub(super) enum Refusal {
     /// Too large a part of the output for a model that is far from the noise.
     TooLarge,
     /// It resembles a misfit of the hysteresis, and the model is far from the noise.
-    TooFar,
+    ResemblesMisfit,
     /// It acts on too few occasions for a model that is far from the noise.
     TooRare,
     /// The model without it, fitted from where the trial ended, explains as much.
@@ -151,7 +151,7 @@ impl Refusal {
             Self::TooLarge => {
                 "would add a large part of the output, but the error of the model would still be far above the noise".to_owned()
             }
-            Self::TooFar => {
+            Self::ResemblesMisfit => {
                 "acts like a misfit of the hysteresis, and the error of the model would still be far above the noise".to_owned()
             }
             Self::TooRare => {

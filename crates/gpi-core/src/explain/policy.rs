@@ -209,8 +209,8 @@ settings! {
         /// are large bring the held-out error within a factor of the noise.
         large: f64 = 0.1, PART;
         near: f64 = 2.0, FROM_ONE;
-        /// Times that the input must exceed a limit of its speed where the model is far from the noise. By hand: with
-        /// fewer than blocks of held-out time, some blocks cannot test the limit.
+        /// Times that the input must exceed a limit of its speed where the model is far from the noise. By hand: as
+        /// many as an experiment has held-out blocks, because with fewer some blocks cannot test the limit.
         exceedances: usize = 10, FROM_ONE;
         /// Part by which the squares must fall for the model without a refused effect to be taken instead of the present one:
         /// that of a finer grid that goes on.

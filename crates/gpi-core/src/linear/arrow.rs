@@ -207,8 +207,8 @@ impl Arrow {
 pub(crate) struct ArrowSolver<'a> {
     arrow: &'a Arrow,
     eliminated: Vec<Option<Eliminated>>,
-    /// `H - sum_e W_e' W_e` of the eliminated groups, (shared, shared).
-    reduced: Matrix,
+    /// `H - sum_e W_e' W_e` of the eliminated groups, (shared, shared); none where a group was eliminated anew.
+    reduced: Option<Matrix>,
 }
 
 /// A group whose free unknowns are eliminated.
@@ -225,29 +225,28 @@ struct Eliminated {
 impl<'a> ArrowSolver<'a> {
     pub(crate) fn new(arrow: &'a Arrow) -> Self {
         let eliminated = arrow.groups.iter().map(|_| None).collect();
-        Self { arrow, eliminated, reduced: arrow.head.clone() }
+        Self { arrow, eliminated, reduced: None }
     }
 
     /// The solution of `A x = b` over some unknowns, with all others at zero; `None` where the matrix of these
     /// unknowns is not positive definite.
     pub(crate) fn solve(&mut self, b: &Vector, is_free: &[bool]) -> Option<Vector> {
         let Arrow { shared, head, groups, .. } = self.arrow;
-        let mut is_reduced = true;
         let free = |unknowns: &[usize]| -> Vec<usize> {
             (0..unknowns.len()).filter(|&at| is_free[unknowns[at]]).collect()
         };
         for (group, kept) in groups.iter().zip(&mut self.eliminated) {
             let free = free(&group.unknowns);
             if kept.as_ref().is_none_or(|kept| kept.free != free) {
+                // also where this elimination fails: those before it have changed
+                self.reduced = None;
                 *kept = Some(group.eliminate(free)?);
-                is_reduced = false;
             }
         }
-        if !is_reduced {
-            // from H each time, so that rounding errors do not add up
-            self.reduced.copy_from(head);
-            self.eliminated.iter().flatten().for_each(|own| self.reduced -= &own.product);
-        }
+        let eliminated = self.eliminated.iter().flatten();
+        // from H each time, so that rounding errors do not add up
+        let reduce = || eliminated.fold(head.clone(), |rest, own| rest - &own.product);
+        let reduced = self.reduced.get_or_insert_with(reduce);
         let known = || groups.iter().zip(self.eliminated.iter().flatten());
         let mut rest = DVector::from_fn(shared.len(), |i, _| b[shared[i]]);
         let mut right = Vec::with_capacity(groups.len());
@@ -258,7 +257,7 @@ impl<'a> ArrowSolver<'a> {
             right.push(own);
         }
         let at = free(shared);
-        let reduced = select(&self.reduced, &at, &at);
+        let reduced = select(reduced, &at, &at);
         let target = rest.select_rows(&at);
         let solution = if reduced.nrows() > LARGE {
             solve_positive(&reduced, &target)?
@@ -321,6 +320,22 @@ mod tests {
             arrow.add_part(&rows.tr_mul(&rows), unknowns);
         }
         arrow
+    }
+
+    #[test]
+    fn a_failed_elimination_leaves_nothing_behind() {
+        let mut arrow = arrow();
+        // unknown 3 depends on nothing: its group cannot be eliminated while it is free
+        arrow.groups[1].own.fill_row(1, 0.0);
+        arrow.groups[1].own.fill_column(1, 0.0);
+        let b = DVector::from_fn(7, |i, _| (i as f64 + 0.5).sin());
+        let free = |held: &[usize]| (0..7).map(|i| !held.contains(&i)).collect::<Vec<_>>();
+        let mut solver = ArrowSolver::new(&arrow);
+        assert!(solver.solve(&b, &free(&[3])).is_some());
+        // the first group changes before the second one fails
+        assert!(solver.solve(&b, &free(&[0])).is_none());
+        let again = solver.solve(&b, &free(&[0, 3])).unwrap();
+        assert_eq!(again, ArrowSolver::new(&arrow).solve(&b, &free(&[0, 3])).unwrap());
     }
 
     #[test]

@@ -13,15 +13,16 @@
 //! 3. *Its own part*: what it adds to the output differs from all that the rest of the model can do ([`own_part`]), or a fit
 //!    without it leaves more than the noise.
 //! 4. *Bridges gaps*: a slow function of time predicts gaps between its knots as well as it fits ([`gaps`]).
-//! 5. *Small, or at the noise*: an effect that is a large part of the output, or acts on a few occasions only, has brought
-//!    the model near the noise ([`size`]). Where it leaves much unexplained, it follows another structure.
+//! 5. *Small, or at the noise*: an effect that is a large part of the output, acts a few times only, or acts like a misfit
+//!    of the hysteresis has brought the model near the noise ([`far_from_noise`]). Where it leaves much unexplained, it
+//!    follows another structure.
 //!
 //! What does not pass is not tried again, and the search goes on without it.
 
 mod contribution;
+mod far_from_noise;
 mod gaps;
 mod own_part;
-mod size;
 
 use super::judgement::{Evidence, Refusal, judge};
 use super::state::{SearchState, Trial};
@@ -97,7 +98,7 @@ pub(super) fn doubt(
     if is_slow && gaps::are_missed(state, point, place)? {
         return Ok(Some(Refusal::Gaps));
     }
-    size::doubt(state, point, place)
+    far_from_noise::doubt(state, point, place)
 }
 
 /// Whether the model reaches the noise with the effect at a place, and a fit without it does not: parameters have bounds, so

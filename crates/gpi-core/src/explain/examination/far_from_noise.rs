@@ -1,4 +1,4 @@
-//! Whether an effect is too large for what it leaves unexplained.
+//! Which effects are not named while the model is far from the noise on what is held out.
 //!
 //! A drift, a creep, a gap or a sensor's curve is a small part of the output of a stage, and once it is modelled the
 //! error is near the noise. One that is a large part of the output, in a model that is still far from the noise, stands
@@ -7,11 +7,13 @@
 //!
 //! `size = min over a, b of rms(c - a y - b) / std(y)`.
 //!
-//! How the half-widths of plays depend on speed is a correction of the hysteresis. It is never named while the model is
-//! far from the noise, because then the hysteresis itself is another. Nor is an effect of the output stage, such as a
-//! sensor's curve: it depends on the position, as every misfit of the hysteresis does. Nor is a limit of the input's speed
-//! that the input exceeds a few times only, such as in single jumps: such a limit explains any error of the response to a
-//! jump, whatever its cause.
+//! The following effects are not named at all while the model is far from the noise:
+//!
+//! - half-widths of plays that depend on speed, because they correct a hysteresis that is itself wrong;
+//! - effects of the output stage, such as a sensor's curve, because they depend on the position, as every misfit of the
+//!   hysteresis does;
+//! - a limit of the input's speed that the input exceeds a few times only, because such a limit explains any error of the
+//!   response to a jump, whatever its cause.
 //!
 //! Lines and measured columns are not asked, because no misfit resembles them, nor are modes, loops and shapes of loops,
 //! which may well be a large part.
@@ -52,7 +54,7 @@ pub(super) fn doubt(
     } else if exceedances(&of, &state.prepared.record).is_some_and(|n| n < policy.exceedances) {
         Ok(Some(Refusal::TooRare))
     } else if matches!(of, Place::Widths(_) | Place::Output(_)) {
-        Ok(Some(Refusal::TooFar))
+        Ok(Some(Refusal::ResemblesMisfit))
     } else if size(state, point, place)? > policy.large {
         Ok(Some(Refusal::TooLarge))
     } else {
