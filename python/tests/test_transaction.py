@@ -250,7 +250,7 @@ def test_signals_end_the_command_without_a_traceback(tmp_path: Path, name: str, 
     launch += f"os.write(1, b'.'); {LAUNCH}"
     chance = random.Random(name)
     codes = set()
-    for _ in range(8):
+    for _ in range(5):
         out = tmp_path / "out"
         child = subprocess.Popen(
             [sys.executable, "-c", launch, "demo", "-o", str(out)],

@@ -6,6 +6,7 @@ Example", figures 3 to 6. Equation numbers are the paper's.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -101,7 +102,20 @@ class ReadingResult:
     v_multisine: Array
     """The true intermediate signal of the record, first 6000 samples."""
     realisations: list[Realisation]
-    refined: RefinedResult
+    hysteresis: Gpi
+    """The true hysteresis."""
+    linear: StateSpace
+    """The true G."""
+    u: Array
+    """Input of the record, (100001,)."""
+    y: Array
+    """Its output without noise, (100001,)."""
+
+    @cached_property
+    def refined(self) -> RefinedResult:
+        """The joint refinement on the first 20001 samples, computed when it is first asked for."""
+        part = slice(REFINED_SAMPLES)
+        return refine_reading(self.hysteresis, self.u[part], self.y[part], self.linear)
 
 
 @dataclass(frozen=True)
@@ -256,7 +270,10 @@ def run_reading(name: str, system: StateSpace) -> ReadingResult:
         v=v_sine,
         v_multisine=v[: len(sine)],
         realisations=realisations,
-        refined=refine_reading(hysteresis, u[:REFINED_SAMPLES], y[:REFINED_SAMPLES], system),
+        hysteresis=hysteresis,
+        linear=system,
+        u=u,
+        y=y,
     )
 
 

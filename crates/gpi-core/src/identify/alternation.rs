@@ -8,9 +8,8 @@ use crate::fit::joint::fit_options;
 use crate::fit::minimize::fit;
 use crate::fit::preparation::{Prepared, rescale};
 use crate::identify::identification::Round;
-use crate::identify::realization::{self, Dynamics};
+use crate::identify::realization::{Dynamics, Response};
 use crate::identify::settings::IdentifySettings;
-use crate::linear::{self, Fir};
 use crate::progress::{Progress, report};
 use crate::{Error, Record};
 
@@ -25,8 +24,8 @@ pub(crate) struct Taps {
 /// Where the joint refinement starts from.
 pub(crate) struct Seed {
     pub point: Point,
-    /// The paper's first stage, u to y.
-    pub fir: Fir,
+    /// Taps of the paper's first stage, u to y.
+    pub taps: usize,
     /// ERA's singular values in the best round.
     pub singular_values: Vec<f64>,
     pub reflected: usize,
@@ -43,8 +42,9 @@ pub(crate) fn seed(
     progress: Progress,
 ) -> Result<Seed, Error> {
     let policy = &settings.alternation;
-    let mut current = dynamics_of(&prepared.record, taps, order, settings, progress)?;
-    let fir = linear::estimate(&prepared.record.pieces(taps.count)?, taps.count, 0.0)?;
+    let mut estimate = DynamicsEstimate::new(&prepared.record, taps, settings)?;
+    let mut current = estimate.of_order(order, taps, progress)?;
+    let first_taps = taps.count;
     let mut rounds = Vec::new();
     let mut point = prepared.point(current.sections()?);
     let linear_alone = prepared.free_run(&mut point)?;
@@ -58,9 +58,10 @@ pub(crate) fn seed(
     for round in 0..policy.rounds {
         report(progress, "rounds", round as f64 / policy.rounds as f64)?;
         if round > 0 {
-            let driven = prepared.driven(&point);
-            let found = driven
-                .and_then(|driven| dynamics_of(&driven, taps, order, settings, progress))
+            let found = prepared
+                .driven(&point)
+                .and_then(|driven| DynamicsEstimate::new(&driven, taps, settings))
+                .and_then(|mut estimate| estimate.of_order(order, taps, progress))
                 .and_then(|found| Ok((found.sections()?, found)));
             // v of this round allows no realization: the best round so far stands
             let Ok((sections, found)) = Error::unless_interrupted(found)? else { break };
@@ -97,27 +98,58 @@ pub(crate) fn seed(
             "{reflected} poles of the realization were unstable and reflected into the unit circle"
         ));
     }
-    Ok(Seed { point, fir, singular_values, reflected, rounds })
+    Ok(Seed { point, taps: first_taps, singular_values, reflected, rounds })
 }
 
-/// G of a record whose input is v, with as many taps as its slowest pole needs.
-pub(crate) fn dynamics_of(
-    record: &Record,
-    taps: &mut Taps,
-    order: Option<usize>,
-    settings: &IdentifySettings,
-    progress: Progress,
-) -> Result<Dynamics, Error> {
-    let mut check = || report(progress, "dynamics", 0.0);
-    let record = &record.pieces(taps.largest)?;
-    let found = realization::estimate(record, taps.count, settings, order, &mut check)?;
-    // taps until the slowest pole has decayed
-    let radius = found.refit.system.spectral_radius()?;
-    let needed = (settings.taps.decayed.ln() / radius.ln()) as usize;
-    if needed > taps.count + taps.count / settings.taps.tolerance && taps.count < taps.largest {
-        taps.count = needed.min(taps.largest);
-        let longer = realization::estimate(record, taps.count, settings, order, &mut check);
-        return Ok(Error::unless_interrupted(longer)?.unwrap_or(found));
+/// G of a record whose input is v, of one order after the other from the same impulse response.
+pub(crate) struct DynamicsEstimate<'a> {
+    record: Record,
+    response: Response,
+    settings: &'a IdentifySettings,
+}
+
+impl<'a> DynamicsEstimate<'a> {
+    /// Estimates the impulse response.
+    pub(crate) fn new(
+        record: &Record,
+        taps: &Taps,
+        settings: &'a IdentifySettings,
+    ) -> Result<Self, Error> {
+        let record = record.pieces(taps.largest)?;
+        let response = Response::estimate(&record, taps.count, settings)?;
+        Ok(Self { record, response, settings })
     }
-    Ok(found)
+
+    /// G of an order, or of the best one, with as many taps as its slowest pole needs.
+    pub(crate) fn of_order(
+        &mut self,
+        order: Option<usize>,
+        taps: &mut Taps,
+        progress: Progress,
+    ) -> Result<Dynamics, Error> {
+        let Self { record, response, settings } = self;
+        let mut check = || report(progress, "dynamics", 0.0);
+        check()?;
+        let policy = &settings.realization;
+        let found = response.realize(record, order, policy, &mut check)?;
+        // taps until the slowest pole has decayed
+        let radius = found.refit.system.spectral_radius()?;
+        let needed = (settings.taps.decayed.ln() / radius.ln()) as usize;
+        let tolerated = response.taps() + response.taps() / settings.taps.tolerance;
+        if needed <= tolerated || response.taps() >= taps.largest {
+            return Ok(found);
+        }
+        taps.count = needed.min(taps.largest);
+        let longer = Response::estimate(record, taps.count, settings).and_then(|longer| {
+            let found = longer.realize(record, order, policy, &mut check)?;
+            Ok((longer, found))
+        });
+        Ok(match Error::unless_interrupted(longer)? {
+            Ok((longer, better)) => {
+                *response = longer;
+                better
+            }
+            Err(_) => found,
+        })
+    }
 }

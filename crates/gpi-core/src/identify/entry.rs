@@ -6,7 +6,7 @@ use crate::identify::long_record::compare;
 use crate::identify::procedure::{Compared, prepare};
 use crate::identify::settings::TapPolicy;
 use crate::progress::{Overall, Progress, ProgressSettings};
-use crate::{Error, Record};
+use crate::{Error, Record, linear};
 
 /// Identifies a model from a record.
 ///
@@ -39,7 +39,7 @@ fn finish(
     progress: Progress,
 ) -> Result<Identification, Error> {
     let Compared { chosen, mut refined, candidates, quasi_static, stages, supported } = found;
-    let ((fir, singular_values, reflected, rounds), supported_taps) = (stages, supported);
+    let ((taps, singular_values, reflected, rounds), supported_taps) = (stages, supported);
     refined.drop_undetermined(prepared, progress)?;
     let refinement = refined.finish(prepared, progress)?;
     let mut notes = prepared.notes.clone();
@@ -52,6 +52,8 @@ fn finish(
             dynamics.delay
         ));
     }
+    let first = |taps| linear::estimate(&prepared.record.pieces(taps)?, taps, 0.0);
+    let fir = taps.map(first).transpose()?;
     let point = &refinement.bands.point;
     let model = point.to_model(prepared.given, &prepared.record, &prepared.means)?;
     let estimates = refinement.estimates(&model)?;

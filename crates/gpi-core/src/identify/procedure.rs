@@ -24,8 +24,8 @@ use crate::identify::identification::{Candidate, IdentifyOptions, Round};
 use crate::identify::quasi_static;
 use crate::identify::settings::{AlternationPolicy, IdentifySettings};
 use crate::identify::structure::StructureSearch;
-use crate::linear::{Fir, excitation_limit};
-use crate::progress::{Progress, Report, report};
+use crate::linear::excitation_limit;
+use crate::progress::{Progress, report};
 use crate::{Error, Record};
 
 /// The structures that were compared on a prepared record.
@@ -35,7 +35,7 @@ pub(crate) struct Compared {
     pub refined: Refined,
     pub candidates: Vec<Candidate>,
     pub(super) quasi_static: bool,
-    pub(super) stages: (Option<Fir>, Vec<f64>, usize, Vec<Round>),
+    pub(super) stages: (Option<usize>, Vec<f64>, usize, Vec<Round>),
     pub(super) supported: usize,
 }
 
@@ -118,12 +118,7 @@ pub(super) fn compare_on_all(
     let mut search = StructureSearch::new(prepared, &settings.structure, options, fast);
     search.climb(&seed.point, progress)?;
     if options.order.is_none() {
-        let mut quiet = |_: &Report| true;
-        let mut dynamics = |driven: &Record, order: usize| {
-            alternation::dynamics_of(driven, &mut few, Some(order), settings, &mut quiet)?
-                .sections()
-        };
-        search.orders(&mut dynamics, progress)?;
+        search.orders(&mut few, settings, progress)?;
     }
     if options.order.is_none() && search.shows_nothing_fast() {
         // All poles are slow and the rest is flat: a gain with a delay takes the place of G.
@@ -135,7 +130,7 @@ pub(super) fn compare_on_all(
         search.shed(progress)?;
     }
     enrich(&mut search, fast, progress)?;
-    let stages = (Some(seed.fir), seed.singular_values, seed.reflected, seed.rounds);
+    let stages = (Some(seed.taps), seed.singular_values, seed.reflected, seed.rounds);
     compared(search, false, stages, supported)
 }
 
@@ -148,7 +143,7 @@ fn enrich(search: &mut StructureSearch, fast: bool, progress: Progress) -> Resul
 fn compared(
     search: StructureSearch,
     quasi_static: bool,
-    stages: (Option<Fir>, Vec<f64>, usize, Vec<Round>),
+    stages: (Option<usize>, Vec<f64>, usize, Vec<Round>),
     supported: usize,
 ) -> Result<Compared, Error> {
     let failure = search.failure();

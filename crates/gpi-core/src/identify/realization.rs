@@ -30,60 +30,84 @@ pub(crate) struct Refit {
     criterion: f64,
 }
 
-/// Estimates G from a record whose input is v. ERA gives the poles of each candidate order, least
-/// squares on y the zeros; the order is the one with the least BIC.
-pub(crate) fn estimate(
-    record: &Record,
+/// The impulse response of a record whose input is v, from which G of any order is realized.
+pub(crate) struct Response {
     taps: usize,
-    settings: &IdentifySettings,
-    order: Option<usize>,
-    check: &mut dyn FnMut() -> Result<(), Error>,
-) -> Result<Dynamics, Error> {
-    let RealizationPolicy { small, largest, worth } = settings.realization;
-    let fir = linear::estimate(record, taps, settings.alternation.ridge)?;
-    check()?;
-    let hankel = Hankel::new(&fir.markov, None)?;
-    if hankel.rank() == 0 && fir.markov[0].amax() == 0.0 {
-        return Err(Error::NoResponse { taps, samples: record.scored() });
-    }
-    let orders: Vec<usize> = match order {
-        Some(order) => vec![order],
-        None => {
-            let suggested = hankel.suggested_order();
-            let rich = suggested > small && suggested <= largest;
-            (1..=small).chain(rich.then_some(suggested)).collect()
+    hankel: Hankel,
+}
+
+impl Response {
+    /// Least squares for so many taps, regularized where the input hardly excites them.
+    pub(crate) fn estimate(
+        record: &Record,
+        taps: usize,
+        settings: &IdentifySettings,
+    ) -> Result<Self, Error> {
+        let markov = linear::estimate(record, taps, settings.alternation.ridge)?.markov;
+        let hankel = Hankel::new(&markov, None)?;
+        if hankel.rank() == 0 && markov[0].amax() == 0.0 {
+            return Err(Error::NoResponse { taps, samples: record.scored() });
         }
-    };
-    let mut best: Option<(usize, Refit)> = None;
-    let mut refusal = None;
-    let mut singular_values = Vec::new();
-    // Reflected poles indicate states that only describe noise.
-    let better = |reflected: usize, refit: &Refit, (least, best): &(usize, Refit)| {
-        (reflected > 0, refit.criterion) < (*least > 0, best.criterion)
-    };
-    for order in orders.into_iter().filter(|&n| order.is_some() || n <= hankel.rank()) {
-        check()?;
-        let realized = hankel.realize(order).and_then(|era| {
-            let refit = refit(record, era.system.clone())?;
-            Ok((era, refit))
-        });
-        let (era, refit) = match realized {
-            Ok(found) => found,
-            Err(error) => {
-                refusal = Some(error);
-                continue;
+        Ok(Self { taps, hankel })
+    }
+
+    /// G of its record. ERA gives the poles of each candidate order, least squares on y the zeros; the order is the one
+    /// with the least BIC, if it is not given.
+    pub(crate) fn realize(
+        &self,
+        record: &Record,
+        order: Option<usize>,
+        policy: &RealizationPolicy,
+        check: &mut dyn FnMut() -> Result<(), Error>,
+    ) -> Result<Dynamics, Error> {
+        let RealizationPolicy { small, largest, worth } = *policy;
+        let Self { taps, hankel } = self;
+        let orders: Vec<usize> = match order {
+            Some(order) => vec![order],
+            None => {
+                let suggested = hankel.suggested_order();
+                let rich = suggested > small && suggested <= largest;
+                (1..=small).chain(rich.then_some(suggested)).collect()
             }
         };
-        singular_values = era.singular_values;
-        let is_worth = |(_, best): &(usize, Refit)| order <= small || refit.rms < worth * best.rms;
-        if best.as_ref().is_none_or(|best| is_worth(best) && better(era.reflected, &refit, best)) {
-            best = Some((era.reflected, refit));
+        let mut best: Option<(usize, Refit)> = None;
+        let mut refusal = None;
+        let mut singular_values = Vec::new();
+        // Reflected poles indicate states that only describe noise.
+        let better = |reflected: usize, refit: &Refit, (least, best): &(usize, Refit)| {
+            (reflected > 0, refit.criterion) < (*least > 0, best.criterion)
+        };
+        for order in orders.into_iter().filter(|&n| order.is_some() || n <= hankel.rank()) {
+            check()?;
+            let realized = hankel.realize(order).and_then(|era| {
+                let refit = refit(record, era.system.clone())?;
+                Ok((era, refit))
+            });
+            let (era, refit) = match realized {
+                Ok(found) => found,
+                Err(error) => {
+                    refusal = Some(error);
+                    continue;
+                }
+            };
+            singular_values = era.singular_values;
+            let is_worth =
+                |(_, best): &(usize, Refit)| order <= small || refit.rms < worth * best.rms;
+            let is_better = |best| is_worth(best) && better(era.reflected, &refit, best);
+            if best.as_ref().is_none_or(is_better) {
+                best = Some((era.reflected, refit));
+            }
+        }
+        match (best, refusal) {
+            (Some((reflected, refit)), _) => Ok(Dynamics { singular_values, reflected, refit }),
+            (None, Some(error)) => Err(error),
+            (None, None) => Err(Error::NoResponse { taps: *taps, samples: record.scored() }),
         }
     }
-    match (best, refusal) {
-        (Some((reflected, refit)), _) => Ok(Dynamics { singular_values, reflected, refit }),
-        (None, Some(error)) => Err(error),
-        (None, None) => Err(Error::NoResponse { taps, samples: record.scored() }),
+
+    /// Number of taps.
+    pub(crate) fn taps(&self) -> usize {
+        self.taps
     }
 }
 

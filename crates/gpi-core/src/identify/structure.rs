@@ -1,5 +1,6 @@
 //! Which structures are compared: how many plays and deadzones, which order and delay.
 
+use crate::Error;
 use crate::chain::bounds::range;
 use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{DynamicsFreedom, Point};
@@ -9,13 +10,13 @@ use crate::fit::minimize::fit;
 use crate::fit::preparation::{Prepared, rescale};
 use crate::fit::problem::residual_rms;
 use crate::fit::{Grid, RefineOptions};
+use crate::identify::alternation::{DynamicsEstimate, Taps};
 use crate::identify::criterion::Comparison;
 use crate::identify::identification::{Candidate, IdentifyOptions};
-use crate::identify::settings::StructurePolicy;
+use crate::identify::settings::{IdentifySettings, StructurePolicy};
 use crate::linear::Sections;
-use crate::progress::Progress;
+use crate::progress::{Progress, Report};
 use crate::uncertainty::noise_floor::NoiseFloor;
-use crate::{Error, Record};
 
 /// How a structure is refined: what the user gives by value is not moved.
 pub(super) fn refine_options(options: &IdentifyOptions) -> RefineOptions {
@@ -101,11 +102,11 @@ impl<'a> StructureSearch<'a> {
         Ok(())
     }
 
-    /// Tries orders below the best one, then above, until they gain nothing. `dynamics` realizes G of
-    /// an order from a record whose input is v.
+    /// Tries orders below the best one, then above, until they gain nothing, each behind the hysteresis of the best one.
     pub(super) fn orders(
         &mut self,
-        dynamics: &mut dyn FnMut(&Record, usize) -> Result<Sections, Error>,
+        taps: &mut Taps,
+        settings: &IdentifySettings,
         progress: Progress,
     ) -> Result<(), Error> {
         let Some(point) = self.comparison.best().cloned() else { return Ok(()) };
@@ -113,26 +114,33 @@ impl<'a> StructureSearch<'a> {
         if order > self.comparison.policy.largest_order {
             return Ok(());
         }
+        let driven = self.comparison.prepared.driven(&point)?;
+        // v that allows no impulse response leaves the order as it is
+        let Ok(mut estimate) = DynamicsEstimate::new(&driven, taps, settings) else {
+            return Ok(());
+        };
+        let mut quiet = |_: &Report| true;
+        let mut dynamics = |order| estimate.of_order(Some(order), taps, &mut quiet)?.sections();
         // Where fewer states do, more will not.
-        if !self.walk(&point, (1..order).rev(), dynamics, progress)? {
-            self.walk(&point, order + 1..=order + 1, dynamics, progress)?;
+        if !self.walk(&point, (1..order).rev(), &mut dynamics, progress)? {
+            self.walk(&point, order + 1..=order + 1, &mut dynamics, progress)?;
         }
         Ok(())
     }
 
     /// Tries orders behind the hysteresis of `point` until two have gained nothing; says whether any gained.
+    /// `dynamics` gives G of an order.
     fn walk(
         &mut self,
         point: &Point,
         orders: impl Iterator<Item = usize>,
-        dynamics: &mut dyn FnMut(&Record, usize) -> Result<Sections, Error>,
+        dynamics: &mut dyn FnMut(usize) -> Result<Sections, Error>,
         progress: Progress,
     ) -> Result<bool, Error> {
-        let driven = self.comparison.prepared.driven(point)?;
         let (mut gained, mut missed) = (false, 0);
         for order in orders {
             let mut other = point.clone();
-            match dynamics(&driven, order) {
+            match dynamics(order) {
                 Ok(sections) => other.replace_dynamics(sections),
                 Err(Error::Interrupted) => return Err(Error::Interrupted),
                 // no such realization

@@ -25,7 +25,7 @@ def paper_command(out: options.Out = None, as_json: options.Json = False) -> Non
     """
     with working("running the paper's example"):
         found = paper()
-    result = describe(found)
+        result = describe(found)
     if out is not None:
         with working("drawing"), files.staged(out) as folder:
             draw(found, folder)

@@ -40,8 +40,15 @@ impl<S: Simd> DoubleDouble<S> {
         Self { high, low }
     }
 
+    /// `a b`, exactly.
     #[inline(always)]
-    fn plus(self, simd: S, other: Self) -> Self {
+    pub(super) fn product(simd: S, a: S::f64s, b: S::f64s) -> Self {
+        let (high, low) = two_product(simd, a, b);
+        Self { high, low }
+    }
+
+    #[inline(always)]
+    pub(super) fn plus(self, simd: S, other: Self) -> Self {
         let (high, rest) = two_sum(simd, self.high, other.high);
         let low = simd.add_f64s(rest, simd.add_f64s(self.low, other.low));
         Self { high, low }.settled(simd)
@@ -123,13 +130,6 @@ impl std::ops::Div for Number {
         let rest = self.minus_product(Scalar, quotient, other);
         quotient + Self::from(rest.high / other.high)
     }
-}
-
-/// The product of two numbers, exactly.
-#[inline(always)]
-pub(super) fn product(a: f64, b: f64) -> Number {
-    let (high, low) = two_product(Scalar, a, b);
-    Number { high, low }
 }
 
 /// Number of samples that is a multiple of the vector width of every processor.
@@ -246,6 +246,9 @@ mod tests {
         assert!((one + Number::from(-1.0)).value().abs() < 1e-31);
         let root = Number::from(2.0).sqrt();
         assert!((root * root + Number::from(-2.0)).value().abs() < 1e-31);
-        assert_eq!(product(1.0 + 2f64.powi(-52), 1.0 + 2f64.powi(-52)).low, 2f64.powi(-104));
+        assert_eq!(
+            Number::product(Scalar, 1.0 + 2f64.powi(-52), 1.0 + 2f64.powi(-52)).low,
+            2f64.powi(-104)
+        );
     }
 }

@@ -4,10 +4,11 @@
 //! r as `A P = Q r`, and `z = Q^T y` follows from `A^T y`. The condition number of `A^T A` is the square of A's, so it
 //! needs twice the digits.
 
-use super::double_double::{DoubleDouble, Number};
+use super::double_double::Number;
+use super::numbers::{Numbers, PartMut};
 use super::triangular_factor::TriangularFactor;
 use crate::Matrix;
-use pulp::{Scalar, Simd};
+use pulp::Simd;
 
 /// Columns that are decomposed at once: they fit into the second-level cache.
 const PANEL: usize = 32;
@@ -22,8 +23,7 @@ pub(super) struct Gram {
     unknowns: usize,
     rows: usize,
     /// By columns, (unknowns + targets, unknowns); elements above the diagonal are not used.
-    high: Vec<f64>,
-    low: Vec<f64>,
+    numbers: Numbers,
     /// The part of each diagonal element that was removed with the means.
     means: Vec<f64>,
     pub squares: Vec<Number>,
@@ -32,26 +32,28 @@ pub(super) struct Gram {
 impl Gram {
     pub(super) fn zeros(unknowns: usize, targets: usize) -> Self {
         let rows = unknowns + targets;
-        let zeros = vec![0.0; rows * unknowns];
         Self {
             unknowns,
             rows,
-            high: zeros.clone(),
-            low: zeros,
+            numbers: Numbers::zeros(rows * unknowns),
             means: vec![0.0; unknowns],
             squares: vec![Number::ZERO; targets],
         }
     }
 
     pub(super) fn add_at(&mut self, row: usize, column: usize, number: Number) {
-        let place = column * self.rows + row;
         let sum = self.get(row, column) + number;
-        (self.high[place], self.low[place]) = (sum.high, sum.low);
+        self.numbers.set(column * self.rows + row, sum);
     }
 
     fn get(&self, row: usize, column: usize) -> Number {
-        let place = column * self.rows + row;
-        Number { high: self.high[place], low: self.low[place] }
+        self.numbers.get(column * self.rows + row)
+    }
+
+    /// So many elements of a column from a row on.
+    pub(super) fn part_mut(&mut self, column: usize, row: usize, count: usize) -> PartMut<'_> {
+        let start = column * self.rows + row;
+        self.numbers.part_mut(start..start + count)
     }
 
     pub(super) fn add(&mut self, other: &Self) {
@@ -70,14 +72,25 @@ impl Gram {
 
     /// Removes the means of columns; `sums` over `count` rows are those of the regressor, then those of the targets.
     pub(super) fn take_means(&mut self, sums: &[Number], count: usize) {
-        let count = Number::from(count as f64);
-        for column in 0..self.unknowns {
-            let mean = -(sums[column] / count);
-            self.means[column] -= (sums[column] * mean).value();
-            for row in column..self.rows {
-                self.add_at(row, column, sums[row] * mean);
+        struct Subtract<'a>(&'a mut Gram, &'a Numbers, Number);
+        impl pulp::WithSimd for Subtract<'_> {
+            type Output = ();
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, simd: S) {
+                let Self(gram, sums, count) = self;
+                let rows = gram.rows;
+                for column in 0..gram.unknowns {
+                    let mean = sums.get(column) / count;
+                    gram.means[column] += (sums.get(column) * mean).value();
+                    let mut own = gram.part_mut(column, column, rows - column);
+                    own.subtract(simd, mean, sums.part(column..rows));
+                }
             }
         }
+        let count = Number::from(count as f64);
+        let mut all = Numbers::default();
+        all.extend(sums);
+        pulp::Arch::new().dispatch(Subtract(self, &all, count));
         for (square, sum) in self.squares.iter_mut().zip(&sums[self.unknowns..]) {
             *square += -(*sum * *sum / count);
         }
@@ -112,8 +125,7 @@ impl Gram {
 
     fn swap_elements(&mut self, one: (usize, usize), other: (usize, usize)) {
         let (one, other) = (one.1 * self.rows + one.0, other.1 * self.rows + other.0);
-        self.high.swap(one, other);
-        self.low.swap(one, other);
+        self.numbers.swap(one, other);
     }
 
     /// Exchanges two unknowns, `one <= other`.
@@ -153,8 +165,7 @@ fn decompose<S: Simd>(simd: S, gram: &mut Gram, order: &mut [usize]) -> usize {
             let root = gram.get(column, column).sqrt();
             for row in column..rows {
                 let part = gram.get(row, column) / root;
-                let place = column * rows + row;
-                (gram.high[place], gram.low[place]) = (part.high, part.low);
+                gram.numbers.set(column * rows + row, part);
                 if row < n {
                     left[row] += -(part * part);
                 }
@@ -174,45 +185,26 @@ fn decompose<S: Simd>(simd: S, gram: &mut Gram, order: &mut [usize]) -> usize {
 fn subtract<S: Simd>(simd: S, gram: &mut Gram, column: usize, earlier: usize) {
     let rows = gram.rows;
     let factor = gram.get(column, earlier);
-    let (high, own_high) = gram.high.split_at_mut(column * rows);
-    let (low, own_low) = gram.low.split_at_mut(column * rows);
-    let (high, low) = (&high[earlier * rows..][column..rows], &low[earlier * rows..][column..rows]);
-    let (own_high, own_low) = (&mut own_high[column..rows], &mut own_low[column..rows]);
-    let (high, high_rest) = S::as_simd_f64s(high);
-    let (low, low_rest) = S::as_simd_f64s(low);
-    let (own_high, own_high_rest) = S::as_mut_simd_f64s(own_high);
-    let (own_low, own_low_rest) = S::as_mut_simd_f64s(own_low);
-    let vector =
-        DoubleDouble { high: simd.splat_f64s(factor.high), low: simd.splat_f64s(factor.low) };
-    let parts = high.iter().zip(low).zip(own_high.iter_mut().zip(own_low));
-    for ((&high, &low), (own_high, own_low)) in parts {
-        let own = DoubleDouble { high: *own_high, low: *own_low };
-        let left = own.minus_product(simd, vector, DoubleDouble { high, low });
-        (*own_high, *own_low) = (left.high, left.low);
-    }
-    let parts = high_rest.iter().zip(low_rest).zip(own_high_rest.iter_mut().zip(own_low_rest));
-    for ((&high, &low), (own_high, own_low)) in parts {
-        let own = Number { high: *own_high, low: *own_low };
-        let left = own.minus_product(Scalar, factor, Number { high, low });
-        (*own_high, *own_low) = (left.high, left.low);
-    }
+    let part = |of: usize| of * rows + column..(of + 1) * rows;
+    let (earlier, mut own) = gram.numbers.split(part(earlier), part(column));
+    own.subtract(simd, factor, earlier);
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::double_double::product;
     use super::*;
     use crate::linear::decompose::svd;
+    use pulp::Scalar;
 
     fn factor(regressor: &Matrix, target: &Matrix) -> TriangularFactor {
         let n = regressor.ncols();
         let mut gram = Gram::zeros(n, 1);
         for (row, y) in regressor.row_iter().zip(target.iter()) {
             for j in 0..n {
-                (j..n).for_each(|i| gram.add_at(i, j, product(row[i], row[j])));
-                gram.add_at(n, j, product(*y, row[j]));
+                (j..n).for_each(|i| gram.add_at(i, j, Number::product(Scalar, row[i], row[j])));
+                gram.add_at(n, j, Number::product(Scalar, *y, row[j]));
             }
-            gram.squares[0] += product(*y, *y);
+            gram.squares[0] += Number::product(Scalar, *y, *y);
         }
         gram.factor()
     }

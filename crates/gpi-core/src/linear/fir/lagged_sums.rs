@@ -10,10 +10,12 @@
 //! So the products of every signal with the lagged inputs (first row and column of each block) and the samples at both
 //! edges are enough. All sums have twice the working precision.
 
-use super::double_double::{Number, WIDTH, lagged_products, product};
+use super::double_double::{Number, WIDTH, lagged_products};
 use super::gram::Gram;
+use super::numbers::Numbers;
 use crate::Matrix;
 use nalgebra::DVector;
+use pulp::Simd;
 
 /// Samples whose products are summed at once: a block of all signals stays in the processor's caches.
 const BLOCK: usize = 4096;
@@ -154,24 +156,45 @@ impl LaggedSums {
         sums
     }
 
-    /// Adds the block of two inputs.
+    /// Adds the block of two inputs, column by column.
     fn add_block(&self, gram: &mut Gram, taps: usize, a: usize, b: usize) {
-        // down each diagonal, starting in the first row or column
-        let diagonal = |gram: &mut Gram, mut i: usize, mut j: usize, mut sum: Number| loop {
-            gram.add_at(a * taps + i, b * taps + j, sum);
-            (i, j) = (i + 1, j + 1);
-            if i.max(j) == taps {
-                break;
+        struct Columns<'a>(&'a LaggedSums, &'a mut Gram, [usize; 3]);
+        impl pulp::WithSimd for Columns<'_> {
+            type Output = ();
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, simd: S) {
+                let Self(sums, gram, [taps, a, b]) = self;
+                sums.add_columns(simd, gram, taps, a, b);
             }
-            let ((entered_a, left_a), (entered_b, left_b)) = (self.edges(a, i), self.edges(b, j));
-            sum += product(entered_a, entered_b);
-            sum += -product(left_a, left_b);
+        }
+        pulp::Arch::new().dispatch(Columns(self, gram, [taps, a, b]));
+    }
+
+    /// Element i of column j follows from element i - 1 of column j - 1. Both have one place in a sequence of numbers,
+    /// of which each column shows a part that begins one place earlier, with an element of the first row.
+    #[inline(always)]
+    fn add_columns<S: Simd>(&self, simd: S, gram: &mut Gram, taps: usize, a: usize, b: usize) {
+        let edges = |input: usize| {
+            let back = move |back| if back > 0 { self.edges(input, back) } else { (0.0, 0.0) };
+            (0..taps).map(back)
         };
-        for lag in 0..taps {
-            diagonal(gram, lag, 0, self.products[b][a][lag]);
-            if a != b && lag > 0 {
-                diagonal(gram, 0, lag, self.products[a][b][lag]);
+        let (entered, left): (Vec<f64>, Vec<f64>) = edges(a).unzip();
+        let mut numbers = Numbers::default();
+        numbers.extend(self.products[a][b].iter().rev());
+        // the element of row and column 0 is in both
+        numbers.extend(&self.products[b][a][1..]);
+        for (column, (own_entered, own_left)) in edges(b).enumerate() {
+            let start = taps - 1 - column;
+            // of a symmetric block, the lower part
+            let row = if a == b { column } else { 0 };
+            if column > 0 {
+                let rows = row.max(1)..taps;
+                let mut part = numbers.part_mut(start + rows.start..start + taps);
+                part.add_products(simd, own_entered, &entered[rows.clone()]);
+                part.add_products(simd, -own_left, &left[rows]);
             }
+            let mut own = gram.part_mut(b * taps + column, a * taps + row, taps - row);
+            own.add(simd, numbers.part(start + row..start + taps));
         }
     }
 }

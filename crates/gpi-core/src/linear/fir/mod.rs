@@ -3,6 +3,7 @@
 mod double_double;
 mod gram;
 mod lagged_sums;
+mod numbers;
 mod persistent_excitation;
 mod statistic;
 mod triangular_factor;
