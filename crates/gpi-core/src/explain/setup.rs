@@ -75,8 +75,12 @@ impl SearchSetup {
 
     /// Root mean square of what is held out, from its squares.
     pub(super) fn holdout_rms(&self, held_out: &[f64]) -> f64 {
-        let values = self.test.scored() * self.test.outputs().len();
-        (held_out.iter().sum::<f64>() / values.max(1) as f64).sqrt()
+        (held_out.iter().sum::<f64>() / self.held_out_values().max(1.0)).sqrt()
+    }
+
+    /// Values that are held out.
+    pub(super) fn held_out_values(&self) -> f64 {
+        (self.test.scored() * self.test.outputs().len()) as f64
     }
 }
 

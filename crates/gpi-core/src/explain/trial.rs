@@ -153,7 +153,6 @@ pub(super) fn measured(
 ) -> Result<Trial, Error> {
     let (cost, values) = (fitted.linearization.cost, state.prepared.values());
     let point = fitted.point.clone();
-    let policy = &state.setup.policy.judgement;
     let deviance = values * (state.cost / cost.max(f64::MIN_POSITIVE)).ln();
     let significance = Significance {
         values,
@@ -161,16 +160,29 @@ pub(super) fn measured(
         is_long: state.setup.is_long(&point),
         is_more: state.is_more(entry),
     };
-    let mut threshold = significance.threshold(policy);
-    if significance.depends_on_autocorrelation(deviance, policy) {
-        let refined = Refined { fitted, options, outliers: 0, robust: false };
-        let uncertainty = refined.uncertainty(&state.prepared.record, progress)?;
-        let factor = uncertainty.used / uncertainty.estimated.max(1) as f64;
-        threshold = significance.threshold_of_autocorrelated(factor, policy);
-    }
+    let threshold = threshold(state, fitted, options, significance, deviance, progress)?;
     let held_out = state.held_out(&point)?;
     let is_driven = is_driven(state, without, &point)?;
     Ok(Trial { entry, point, cost, deviance, threshold, held_out, promised, is_driven })
+}
+
+/// What a deviance must exceed, with the autocorrelation of the residual of a fit where that matters.
+pub(super) fn threshold(
+    state: &SearchState,
+    fitted: Fitted,
+    options: FitOptions,
+    significance: Significance,
+    deviance: f64,
+    progress: Progress,
+) -> Result<f64, Error> {
+    let policy = &state.setup.policy.judgement;
+    if !significance.depends_on_autocorrelation(deviance, policy) {
+        return Ok(significance.threshold(policy));
+    }
+    let refined = Refined { fitted, options, outliers: 0, robust: false };
+    let uncertainty = refined.uncertainty(&state.prepared.record, progress)?;
+    let factor = uncertainty.used / uncertainty.estimated.max(1) as f64;
+    Ok(significance.threshold_of_autocorrelated(factor, policy))
 }
 
 /// Whether it is the input that makes the lags beside G explain what they do: those whose initial state is unknown
@@ -188,10 +200,11 @@ fn is_driven(state: &SearchState, without: &Point, with: &Point) -> Result<bool,
     Ok(squares(&undriven)? > state.setup.policy.judgement.driven * squares(without)?)
 }
 
-/// Whether the last steps of a fit that had no more were long ones.
+/// Whether the last steps of a fit that had no more were long ones; all steps where it took few, because most that it
+/// tried failed.
 fn makes_progress(fitted: &Fitted, policy: &FitPolicy) -> bool {
     let history = &fitted.history;
-    let before = history.len().checked_sub(policy.last_steps + 1).map(|place| history[place]);
-    let is_lower = |before| fitted.linearization.cost < (1.0 - policy.progress) * before;
-    fitted.status == Status::Limit && before.is_some_and(is_lower)
+    let before = history[history.len().saturating_sub(policy.last_steps + 1)];
+    let is_lower = fitted.linearization.cost < (1.0 - policy.progress) * before;
+    fitted.status == Status::Limit && is_lower
 }
