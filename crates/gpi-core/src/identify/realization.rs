@@ -43,7 +43,7 @@ impl Response {
         taps: usize,
         settings: &IdentifySettings,
     ) -> Result<Self, Error> {
-        let markov = linear::estimate(record, taps, settings.alternation.ridge)?.markov;
+        let markov = linear::impulse_response(record, taps, settings.alternation.ridge)?;
         let hankel = Hankel::new(&markov, None)?;
         if hankel.rank() == 0 && markov[0].amax() == 0.0 {
             return Err(Error::NoResponse { taps, samples: record.scored() });

@@ -148,12 +148,19 @@ pub(crate) fn eigen(
     ))
 }
 
-/// Solves `matrix x = right` for a symmetric matrix, of which the lower triangle is used; `None` if it is not positive
-/// definite.
-pub(crate) fn solve_positive(matrix: &Matrix, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let right = MatRef::from_column_major_slice(right.as_slice(), right.len(), 1);
-    let found = view(matrix).llt(Side::Lower).ok()?.solve(right);
-    Some(DVector::from_fn(found.nrows(), |i, _| found[(i, 0)]))
+/// The Cholesky decomposition of a symmetric matrix, of which the lower triangle is used.
+pub(crate) struct Positive(solvers::Llt<f64>);
+
+impl Positive {
+    /// `None` if the matrix is not positive definite.
+    pub(crate) fn new(matrix: &Matrix) -> Option<Self> {
+        view(matrix).llt(Side::Lower).ok().map(Self)
+    }
+
+    /// Solves `matrix x = right`.
+    pub(crate) fn solve(&self, right: &Matrix) -> Matrix {
+        owned(self.0.solve(view(right)).as_ref())
+    }
 }
 
 /// Solves `matrix x = right`; `None` if the matrix is singular. The solution of an empty system is empty.

@@ -26,7 +26,7 @@ pub(crate) use arrow::{Arrow, Group as ArrowGroup};
 pub(crate) use decompose::symmetric_eigen;
 pub(crate) use dot::dot;
 pub(crate) use era::Hankel;
-pub(crate) use fir::excitation_limit;
+pub(crate) use fir::{excitation_limit, impulse_response};
 pub(crate) use least_squares::{NormalEquations, bounded};
 pub(crate) use section::{Section, advance, move_poles};
 pub(crate) use sections::Sections;

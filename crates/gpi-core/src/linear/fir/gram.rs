@@ -96,6 +96,13 @@ impl Gram {
         }
     }
 
+    /// `A^T A` and `A^T y`, (unknowns, unknowns) and (unknowns, targets), in working precision.
+    pub(super) fn rounded(&self) -> (Matrix, Matrix) {
+        let (n, targets) = (self.unknowns, self.squares.len());
+        let gram = Matrix::from_fn(n, n, |i, j| self.get(i.max(j), i.min(j)).value());
+        (gram, Matrix::from_fn(n, targets, |i, target| self.get(n + target, i).value()))
+    }
+
     /// The Cholesky decomposition. The next pivot is the column of which the earlier ones explain the smallest fraction.
     ///
     /// It ends where the mean and the earlier columns explain all other columns up to [`DEPENDENT`].

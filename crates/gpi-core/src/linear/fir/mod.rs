@@ -2,6 +2,7 @@
 
 mod double_double;
 mod gram;
+mod iterated_ridge;
 mod lagged_sums;
 mod numbers;
 mod persistent_excitation;
@@ -10,6 +11,7 @@ mod triangular_factor;
 
 pub use statistic::FirStatistic;
 
+pub(crate) use iterated_ridge::impulse_response;
 pub(crate) use persistent_excitation::excitation_limit;
 
 use crate::{Error, Experiment, Matrix, Record};
@@ -91,11 +93,14 @@ impl Fir {
 /// `taps` is zero, the ridge is negative, or there are fewer samples than unknowns. Weak excitation is not an error here:
 /// see [`Fir::rank`].
 pub fn estimate(record: &Record, taps: usize, ridge: f64) -> Result<Fir, Error> {
-    let inputs = record.inputs().len();
+    require_samples_of(record, taps)?;
+    gathered(record, taps)?.solve(ridge)
+}
+
+fn require_samples_of(record: &Record, taps: usize) -> Result<(), Error> {
     let runs = record.experiments();
     let rows = |e: &Experiment| e.input.nrows().saturating_sub(e.warmup.max(taps.max(1) - 1));
-    require_samples(runs.iter().map(rows).sum(), taps, inputs, runs.len())?;
-    gathered(record, taps)?.solve(ridge)
+    require_samples(runs.iter().map(rows).sum(), taps, record.inputs().len(), runs.len())
 }
 
 /// The statistic of all experiments of a record.

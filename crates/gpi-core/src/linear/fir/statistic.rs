@@ -125,6 +125,13 @@ impl FirStatistic {
         (all.gram.factor(), all.sums)
     }
 
+    /// The normal equations in working precision: `A^T A` and `A^T y` of the centred regressor A and targets y.
+    pub(super) fn equations(&self) -> (Matrix, Matrix) {
+        let mut all = self.clone();
+        all.end_experiment();
+        all.gram.rounded()
+    }
+
     /// Number of experiments, including the present one.
     pub fn experiments(&self) -> usize {
         self.sums.len() + usize::from(self.present.seen > 0)
