@@ -11,6 +11,11 @@ pub trait Block {
     /// Takes other values, as many as [`Block::values`] returns.
     fn set(&mut self, values: &[f64]);
 
+    /// Takes every second knot of a smooth curve through evenly spaced knots; `false` where it has no fewer knots.
+    fn coarsen(&mut self) -> bool {
+        false
+    }
+
     /// Smallest and largest sensible value of each.
     fn bounds(&self) -> Vec<(f64, f64)> {
         vec![(f64::NEG_INFINITY, f64::INFINITY); self.values().len()]

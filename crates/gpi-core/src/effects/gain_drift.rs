@@ -53,6 +53,10 @@ impl Block for GainDrift {
         self.changes.copy_from_slice(values);
     }
 
+    fn coarsen(&mut self) -> bool {
+        knots::coarsen(&mut self.changes)
+    }
+
     fn steps(&self) -> Vec<f64> {
         vec![1e-3; self.changes.len()]
     }

@@ -18,6 +18,7 @@ pub(crate) mod base;
 mod blocks;
 mod concurrently;
 mod examination;
+mod exchange;
 mod explanation;
 mod grid;
 mod judgement;

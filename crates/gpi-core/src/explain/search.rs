@@ -1,12 +1,11 @@
 //! The closed loop: score candidates, fit the best few jointly, keep what the held-out data confirm.
 
 use super::examination::{doubt, examine};
+use super::exchange::{exchange_slow, prefer_driven};
 use super::grid::refine_grids;
 use super::judgement::{Evidence, Refusal, choose, refusal};
 use super::ranking::{ranked, scored_beside};
-use super::revision::{
-    drop_superfluous, exchange_slow, prefer_driven, rearrange, shed_lags, shed_lines,
-};
+use super::revision::{drop_superfluous, rearrange, shed_lags, shed_lines};
 use super::setup::SearchSetup;
 use super::state::{Addition, Rejected, SearchState, Trial};
 use super::trial::{join_modes, trial, trials as trials_of};

@@ -1,0 +1,176 @@
+//! Slow functions of time, compared with what could stand in their place.
+//!
+//! They are flexible enough to follow much of what the input drives, but they do not predict another experiment. That is
+//! why an effect that the input drives and that explains as much is preferred, and not the other way round. Two slow
+//! functions of time follow each other's curve in part, since where each of them acts matters less than when.
+//!
+//! Both rivals are fitted by as many steps. What is lost with the rival is counted on the training squares J of N values
+//! and on the held-out squares T of M values, as twice the loss of the log-likelihood of white Gaussian noise:
+//!
+//! ```text
+//! lost = N ln(J_rival / J) + M ln(T_rival / T)
+//! ```
+//!
+//! | rival | replaces the slow function where |
+//! |---|---|
+//! | a driven effect | `lost` < what the slow function must gain, `T_rival < f T`, plausible values |
+//! | another slow function with q more unknowns | `lost + q ln N < -2 ln L`, L looks ([`super::judgement`]) |
+//!
+//! The number of knots was chosen beside a model that did not fit yet. Of both rivals, every second knot is taken out as long
+//! as that lowers the BIC, since superfluous knots count as unknowns.
+
+use super::judgement::{Significance, is_superfluous};
+use super::ranking::{Ranked, scored_beside};
+use super::state::{Addition, SearchState, Trial};
+use super::trial::{measured, start, threshold};
+use crate::Error;
+use crate::Progress;
+use crate::chain::point::Point;
+use crate::effects::{CATALOGUE, Entry, Signature};
+use crate::fit::minimize::{FitOptions, Fitted};
+use crate::progress::as_trial;
+
+/// Replaces a slow function of time, which can fit much, by an effect that the input drives and that explains as much;
+/// says whether there was any.
+pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    let mut is_replaced = false;
+    let is_slow = |entry: &Entry| entry.signature == Signature::SlowInTime;
+    let driven: Vec<&'static Entry> =
+        state.setup.allowed.iter().copied().filter(|own| own.driven && !is_slow(own)).collect();
+    // from the end of the chain
+    for slow in CATALOGUE.iter().rev().filter(|entry| is_slow(entry)) {
+        let place = state.point.effects.iter().position(|effect| effect.name() == slow.name);
+        let Some(place) = place else { continue };
+        let without = state.point.without_effect(place);
+        let best = scored_beside(state, &without, &driven, progress)?.into_iter().next();
+        let Some(Ranked { entry, score, .. }) = best else { continue };
+        let named = state.additions.iter().find(|addition| addition.trial.entry.name == slow.name);
+        let Some(deviance) = named.map(|own| own.trial.deviance) else { continue };
+        let gain = score.gain;
+        let start = start(state, &without, score)?;
+        let options = longer(state);
+        let fitted = as_trial(progress, ("exchange", entry.name), (0, 1), |progress| {
+            state.fit(start, &options, entry.name, progress)
+        })?;
+        let threshold = settle(state, slow, state.setup.unknowns(&without), deviance, progress)?;
+        let trial = measured(state, &without, entry, fitted, options, gain, progress)?;
+        let held_out = state.held_out(&state.point)?;
+        let lost = lost(state, &trial, &held_out);
+        // what the slow function had gained, less what is lost with it
+        let trial = Trial { deviance: deviance - lost, ..trial };
+        let factor = state.setup.policy.revision.driven_instead;
+        if trial.is_driven
+            && state.is_plausible(&trial.point)
+            && is_superfluous(lost, threshold, [&held_out, &trial.held_out], factor)
+        {
+            let dropped = vec![slow.name];
+            state.point = trial.point.clone();
+            state.add(Addition { trial, others: Vec::new(), dropped })?;
+            // the grids were placed, and the effect's terms counted, beside the slow function
+            state.is_rich = false;
+            is_replaced = true;
+        }
+    }
+    Ok(is_replaced)
+}
+
+/// The fit of a point with a slow function of time, with every second of its knots as long as that lowers the BIC.
+fn settled(
+    state: &SearchState,
+    point: Point,
+    slow: &'static Entry,
+    progress: Progress,
+) -> Result<Fitted, Error> {
+    let options = longer(state);
+    let fit = |start: Point, progress: Progress| {
+        as_trial(progress, ("exchange", slow.name), (0, 1), |progress| {
+            state.fit(start, &options, slow.name, progress)
+        })
+    };
+    let values = state.prepared.values();
+    let information = |fitted: &Fitted| {
+        let price = state.setup.unknowns(&fitted.point) as f64 * values.ln();
+        values * fitted.linearization.cost.ln() + price
+    };
+    let mut best = fit(point, progress)?;
+    while let Some(coarser) = coarser(&best.point, slow) {
+        let fitted = fit(coarser, progress)?;
+        if information(&fitted) > information(&best) {
+            break;
+        }
+        best = fitted;
+    }
+    Ok(best)
+}
+
+/// A point whose slow function of time has every second of its knots.
+fn coarser(point: &Point, slow: &Entry) -> Option<Point> {
+    let place = point.effects.iter().position(|one| one.name() == slow.name)?;
+    Some(point.without_effect(place).with_effect(point.effects[place].coarser()?))
+}
+
+/// Options of fits that are compared after an exchange: both rivals take as many steps, because a fit that ended at its
+/// step limit is worse than it could be.
+fn longer(state: &SearchState) -> FitOptions {
+    let steps = state.setup.policy.revision.longer * state.setup.options.steps;
+    FitOptions { steps, ..state.setup.options.clone() }
+}
+
+/// Settles the slow function of time of the present model. Returns what it must gain there: the residual of a fit that ended
+/// early is autocorrelated, and its threshold is too high.
+fn settle(
+    state: &mut SearchState,
+    slow: &'static Entry,
+    without: usize,
+    deviance: f64,
+    progress: Progress,
+) -> Result<f64, Error> {
+    let fitted = settled(state, state.point.clone(), slow, progress)?;
+    (state.point, state.cost) = (fitted.point.clone(), fitted.linearization.cost);
+    let significance = Significance {
+        values: state.prepared.values(),
+        added: state.setup.unknowns(&state.point) - without,
+        is_long: state.setup.is_long(&state.point),
+        is_more: false,
+    };
+    threshold(state, fitted, longer(state), significance, deviance, progress)
+}
+
+/// The deviance lost with a trial, on the training data and on what is held out.
+fn lost(state: &SearchState, trial: &Trial, held_out: &[f64]) -> f64 {
+    let [before, after] = [held_out, &trial.held_out].map(|blocks| blocks.iter().sum::<f64>());
+    state.prepared.values() * (trial.cost / state.cost).ln()
+        + state.setup.held_out_values() * (after / before).ln()
+}
+
+/// Replaces a slow function of time by one that acts elsewhere where that explains more, now that the rest is known.
+pub(super) fn exchange_slow(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+    let is_slow = |entry: &Entry| entry.signature == Signature::SlowInTime;
+    for place in 0..state.point.effects.len() {
+        let own = state.point.effects[place].entry();
+        let is_other = |entry: &&Entry| is_slow(entry) && !state.has(entry);
+        let others: Vec<&'static Entry> =
+            state.setup.allowed.iter().copied().filter(is_other).collect();
+        if !is_slow(own) || others.is_empty() {
+            continue;
+        }
+        let without = state.point.without_effect(place);
+        let best = scored_beside(state, &without, &others, progress)?.into_iter().next();
+        let Some(Ranked { entry, score, .. }) = best else { continue };
+        let gain = score.gain;
+        let start = start(state, &without, score)?;
+        let fitted = settled(state, start, entry, progress)?;
+        let unknowns = |point| state.setup.unknowns(point) as f64;
+        let price =
+            (unknowns(&fitted.point) - unknowns(&state.point)) * state.prepared.values().ln();
+        let trial = measured(state, &without, entry, fitted, longer(state), gain, progress)?;
+        let held_out = state.held_out(&state.point)?;
+        let lost = lost(state, &trial, &held_out) + price;
+        if -lost > 2.0 * state.setup.policy.judgement.looks.ln() {
+            state.point = trial.point.clone();
+            let dropped = vec![own.name];
+            state.add(Addition { trial, others: Vec::new(), dropped })?;
+        }
+    }
+    Ok(())
+}
