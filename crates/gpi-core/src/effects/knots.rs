@@ -14,7 +14,7 @@ pub(super) fn quantities(name: &str, unit: &str, later: &[f64], duration: f64) -
 
 /// Keeps every second of the later knots, so that the first and the last stay; `false` where their number is odd.
 pub(super) fn coarsen(later: &mut Vec<f64>) -> bool {
-    let is_even = later.len() >= 2 && later.len() % 2 == 0;
+    let is_even = later.len() >= 2 && later.len().is_multiple_of(2);
     if is_even {
         *later = later.iter().skip(1).step_by(2).copied().collect();
     }

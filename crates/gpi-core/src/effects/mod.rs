@@ -201,7 +201,7 @@ impl Effect {
     /// The same slow function of time through every second of its knots, if it has fewer.
     pub(crate) fn coarser(&self) -> Option<Self> {
         let mut coarser = self.clone();
-        coarser.place_mut().block().is_some_and(|block| block.coarsen()).then_some(coarser)
+        coarser.place_mut().block().is_some_and(Block::coarsen).then_some(coarser)
     }
 
     /// The same on the other side of the output stage, if it is an added signal.

@@ -61,7 +61,7 @@ mod tests {
             Experiment::new(u, y)
         };
         let channels = |name: &str| {
-            vec![Channel::new(&format!("{name}1"), ""), Channel::new(&format!("{name}2"), "")]
+            vec![Channel::new(format!("{name}1"), ""), Channel::new(format!("{name}2"), "")]
         };
         let record =
             Record::new(vec![run(0.1), run(0.7)], 1.0, channels("u"), channels("y"), vec![])
