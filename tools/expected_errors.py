@@ -59,7 +59,8 @@ def compared(seed: int, lacks: tuple[str, ...] = ()) -> list[float]:
     parts = [expected["parts"][name] for name in PARTS]
     static = found.error_static_curve["rms"]
     scale = 100 / np.ptp(wanted)
-    shares = [scale * part for part in (*parts, static, noise)]
+    # a part that the model does not know is None
+    shares = [np.nan if part is None else scale * part for part in (*parts, static, noise)]
     return [scale * rms, scale * expected["rms"], expected["rms"] / rms, *shares]
 
 
