@@ -11,7 +11,8 @@ pub trait Block {
     /// Takes other values, as many as [`Block::values`] returns.
     fn set(&mut self, values: &[f64]);
 
-    /// Takes every second knot of a smooth curve through evenly spaced knots; `false` where it has no fewer knots.
+    /// Takes every second knot of a smooth curve through evenly spaced knots; `false` if there is no such
+    /// curve, or an odd number of knots after the first.
     fn coarsen(&mut self) -> bool {
         false
     }

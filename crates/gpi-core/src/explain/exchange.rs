@@ -2,9 +2,9 @@
 //!
 //! They are flexible enough to follow much of what the input drives, but they do not predict another experiment. That is
 //! why an effect that the input drives and that explains as much is preferred, and not the other way round. Two slow
-//! functions of time follow each other's curve in part, since where each of them acts matters less than when.
+//! functions of time that act at different places of the chain can explain a part of each other's effect.
 //!
-//! Both rivals are fitted by as many steps. What is lost with the rival is counted on the training squares J of N values
+//! Both rivals are fitted with the same number of steps. What is lost with the rival is counted on the training squares J of N values
 //! and on the held-out squares T of M values, as twice the loss of the log-likelihood of white Gaussian noise:
 //!
 //! ```text
@@ -14,10 +14,10 @@
 //! | rival | replaces the slow function where |
 //! |---|---|
 //! | a driven effect | `lost` < what the slow function must gain, `T_rival < f T`, plausible values |
-//! | another slow function with q more unknowns | `lost + q ln N < -2 ln L`, L looks ([`super::judgement`]) |
+//! | another slow function with q more unknowns | `lost + q ln N < -2 ln L`, L the number of looks ([`super::judgement`]) |
 //!
-//! The number of knots was chosen beside a model that did not fit yet. Of both rivals, every second knot is taken out as long
-//! as that lowers the BIC, since superfluous knots count as unknowns.
+//! The number of knots was chosen beside a model that did not fit yet. In both rivals, every second knot is therefore removed
+//! as long as that lowers the BIC. Superfluous knots would count as unknowns.
 
 use super::judgement::{Significance, is_superfluous};
 use super::ranking::{Ranked, scored_beside};
@@ -74,7 +74,7 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
     Ok(is_replaced)
 }
 
-/// The fit of a point with a slow function of time, with every second of its knots as long as that lowers the BIC.
+/// The fit of a point with a slow function of time, of which every second knot is removed as long as that lowers the BIC.
 fn settled(
     state: &SearchState,
     point: Point,
@@ -109,8 +109,8 @@ fn coarser(point: &Point, slow: &Entry) -> Option<Point> {
     Some(point.without_effect(place).with_effect(point.effects[place].coarser()?))
 }
 
-/// Options of fits that are compared after an exchange: both rivals take as many steps, because a fit that ended at its
-/// step limit is worse than it could be.
+/// Options of both fits that are compared. They have the same step limit, because a fit that ends at its limit is not at its
+/// minimum.
 fn longer(state: &SearchState) -> FitOptions {
     let steps = state.setup.policy.revision.longer * state.setup.options.steps;
     FitOptions { steps, ..state.setup.options.clone() }

@@ -230,7 +230,8 @@ settings! {
         superfluous: f64 = 1.5, FROM_ONE;
         /// Factor by which the held-out squares may grow when a driven effect replaces a slow function of time. By hand.
         driven_instead: f64 = 1.05, FROM_ONE;
-        /// Times the steps of a trial that its fit may take: it has lost what it started from. By hand.
+        /// Fits that are compared after an exchange take so many times the steps of a trial: they start farther from
+        /// their minimum. By hand.
         longer: usize = 2, FROM_ONE;
         /// Factor by which the squares may grow when an effect replaces slow poles of G. By hand.
         instead_of_lags: f64 = 1.05, FROM_ONE;

@@ -20,7 +20,7 @@
 //! number of experiments, where a dense matrix takes its third power and its square. Source: A. Björck, Numerical
 //! Methods for Least Squares Problems, 1996, section 6.3 (block angular problems).
 
-use super::decompose::Positive;
+use super::decompose::Cholesky;
 use crate::Matrix;
 use nalgebra::DVector;
 
@@ -260,7 +260,7 @@ impl<'a> ArrowSolver<'a> {
         let reduced = select(reduced, &at, &at);
         let target = rest.select_rows(&at);
         let solution = if reduced.nrows() > LARGE {
-            let solved = Positive::new(&reduced)?.solve(&Matrix::from_columns(&[target]));
+            let solved = Cholesky::new(&reduced)?.solve(&Matrix::from_columns(&[target]));
             solved.column(0).into_owned()
         } else {
             reduced.cholesky()?.solve(&target)

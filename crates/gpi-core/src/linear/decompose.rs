@@ -149,9 +149,9 @@ pub(crate) fn eigen(
 }
 
 /// The Cholesky decomposition of a symmetric matrix, of which the lower triangle is used.
-pub(crate) struct Positive(solvers::Llt<f64>);
+pub(crate) struct Cholesky(solvers::Llt<f64>);
 
-impl Positive {
+impl Cholesky {
     /// `None` if the matrix is not positive definite.
     pub(crate) fn new(matrix: &Matrix) -> Option<Self> {
         view(matrix).llt(Side::Lower).ok().map(Self)

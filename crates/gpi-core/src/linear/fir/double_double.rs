@@ -55,19 +55,11 @@ impl<S: Simd> DoubleDouble<S> {
     }
 
     #[inline(always)]
-    fn times(self, simd: S, other: Self) -> Self {
+    pub(super) fn times(self, simd: S, other: Self) -> Self {
         let (high, rest) = two_product(simd, self.high, other.high);
         let low = simd.mul_add_f64s(self.low, other.high, rest);
         let low = simd.mul_add_f64s(self.high, other.low, low);
         Self { high, low }.settled(simd)
-    }
-
-    /// `self - a b`.
-    #[inline(always)]
-    pub(super) fn minus_product(self, simd: S, a: Self, b: Self) -> Self {
-        let product = a.times(simd, b);
-        let (high, low) = (simd.neg_f64s(product.high), simd.neg_f64s(product.low));
-        self.plus(simd, Self { high, low })
     }
 }
 
@@ -80,7 +72,7 @@ impl Number {
 
     pub(super) fn sqrt(self) -> Self {
         let root = Self::from(self.high.sqrt());
-        let rest = self.minus_product(Scalar, root, root);
+        let rest = self + -(root * root);
         root + Self::from(rest.high / (2.0 * root.high))
     }
 }
@@ -127,7 +119,7 @@ impl std::ops::Div for Number {
     #[inline(always)]
     fn div(self, other: Self) -> Self {
         let quotient = Self::from(self.high / other.high);
-        let rest = self.minus_product(Scalar, quotient, other);
+        let rest = self + -(quotient * other);
         quotient + Self::from(rest.high / other.high)
     }
 }

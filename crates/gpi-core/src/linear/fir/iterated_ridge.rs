@@ -12,11 +12,11 @@
 //! precision suffices for it, and one Cholesky decomposition serves all passes. The excitation is not looked at.
 
 use super::{gathered, require_samples_of};
-use crate::linear::decompose::Positive;
+use crate::linear::decompose::Cholesky;
 use crate::{Error, Matrix, Record};
 
 /// Passes, with which a hardly excited direction is suppressed and a well excited one hardly biased.
-const PASSES: usize = 3;
+pub(super) const PASSES: i32 = 3;
 
 /// Estimates `taps` Markov parameters, each (outputs, inputs), with one offset per experiment, by a positive ridge.
 pub(crate) fn impulse_response(
@@ -29,7 +29,7 @@ pub(crate) fn impulse_response(
     let (gram, right) = statistic.equations();
     let penalty = ridge * gram.trace() / gram.nrows() as f64;
     let raised = &gram + Matrix::from_diagonal_element(gram.nrows(), gram.nrows(), penalty);
-    let Some(factor) = Positive::new(&raised) else {
+    let Some(factor) = Cholesky::new(&raised) else {
         // an input that never moves, or a ridge below rounding
         return Ok(statistic.solve(ridge)?.markov);
     };

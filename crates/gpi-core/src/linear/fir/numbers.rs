@@ -77,23 +77,23 @@ impl PartMut<'_> {
     /// Adds the numbers of another part of the same length.
     #[inline(always)]
     pub(super) fn add<S: Simd>(&mut self, simd: S, other: Part) {
-        self.combine(simd, other, Sum);
+        self.increase(simd, other, Itself);
     }
 
     /// Subtracts `factor` times the numbers of another part of the same length.
     #[inline(always)]
     pub(super) fn subtract<S: Simd>(&mut self, simd: S, factor: Number, other: Part) {
-        self.combine(simd, other, MinusProduct(factor));
+        self.increase(simd, other, Multiple(-factor));
     }
 
     /// Adds `factor` times each of `values`, exactly before each sum is rounded.
     #[inline(always)]
     pub(super) fn add_products<S: Simd>(&mut self, simd: S, factor: f64, values: &[f64]) {
-        self.combine(simd, Part { high: values, low: values }, Product(factor));
+        self.increase(simd, Part { high: values, low: values }, MultipleOfHigh(factor));
     }
 
     #[inline(always)]
-    fn combine<S: Simd, C: Combine>(&mut self, simd: S, other: Part, rule: C) {
+    fn increase<S: Simd, A: Addend>(&mut self, simd: S, other: Part, addend: A) {
         let (high, high_rest) = S::as_simd_f64s(other.high);
         let (low, low_rest) = S::as_simd_f64s(other.low);
         let (own_high, own_high_rest) = S::as_mut_simd_f64s(self.high);
@@ -101,74 +101,53 @@ impl PartMut<'_> {
         let vectors = own_high.iter_mut().zip(own_low).zip(high.iter().zip(low));
         for ((own_high, own_low), (&high, &low)) in vectors {
             let own = DoubleDouble { high: *own_high, low: *own_low };
-            let own = rule.apply(simd, own, DoubleDouble { high, low });
+            let own = own.plus(simd, addend.of(simd, DoubleDouble { high, low }));
             (*own_high, *own_low) = (own.high, own.low);
         }
         let rest = own_high_rest.iter_mut().zip(own_low_rest).zip(high_rest.iter().zip(low_rest));
         for ((own_high, own_low), (&high, &low)) in rest {
             let own = Number { high: *own_high, low: *own_low };
-            let own = rule.apply(Scalar, own, Number { high, low });
+            let own = own.plus(Scalar, addend.of(Scalar, Number { high, low }));
             (*own_high, *own_low) = (own.high, own.low);
         }
     }
 }
 
-/// What becomes of a number with another one.
-trait Combine: Copy {
-    fn apply<S: Simd>(
-        self,
-        simd: S,
-        own: DoubleDouble<S>,
-        other: DoubleDouble<S>,
-    ) -> DoubleDouble<S>;
+/// What is added to a number for another one.
+trait Addend: Copy {
+    fn of<S: Simd>(self, simd: S, other: DoubleDouble<S>) -> DoubleDouble<S>;
 }
 
-/// The sum of both.
+/// The other number.
 #[derive(Clone, Copy)]
-struct Sum;
+struct Itself;
 
-impl Combine for Sum {
+impl Addend for Itself {
     #[inline(always)]
-    fn apply<S: Simd>(
-        self,
-        simd: S,
-        own: DoubleDouble<S>,
-        other: DoubleDouble<S>,
-    ) -> DoubleDouble<S> {
-        own.plus(simd, other)
+    fn of<S: Simd>(self, _: S, other: DoubleDouble<S>) -> DoubleDouble<S> {
+        other
     }
 }
 
-/// The number less a multiple of the other one.
+/// A multiple of the other number.
 #[derive(Clone, Copy)]
-struct MinusProduct(Number);
+struct Multiple(Number);
 
-impl Combine for MinusProduct {
+impl Addend for Multiple {
     #[inline(always)]
-    fn apply<S: Simd>(
-        self,
-        simd: S,
-        own: DoubleDouble<S>,
-        other: DoubleDouble<S>,
-    ) -> DoubleDouble<S> {
+    fn of<S: Simd>(self, simd: S, other: DoubleDouble<S>) -> DoubleDouble<S> {
         let Number { high, low } = self.0;
-        let factor = DoubleDouble { high: simd.splat_f64s(high), low: simd.splat_f64s(low) };
-        own.minus_product(simd, factor, other)
+        DoubleDouble { high: simd.splat_f64s(high), low: simd.splat_f64s(low) }.times(simd, other)
     }
 }
 
-/// The number and a multiple of the other one's high part.
+/// A multiple of the other number's high part, exactly.
 #[derive(Clone, Copy)]
-struct Product(f64);
+struct MultipleOfHigh(f64);
 
-impl Combine for Product {
+impl Addend for MultipleOfHigh {
     #[inline(always)]
-    fn apply<S: Simd>(
-        self,
-        simd: S,
-        own: DoubleDouble<S>,
-        other: DoubleDouble<S>,
-    ) -> DoubleDouble<S> {
-        own.plus(simd, DoubleDouble::product(simd, simd.splat_f64s(self.0), other.high))
+    fn of<S: Simd>(self, simd: S, other: DoubleDouble<S>) -> DoubleDouble<S> {
+        DoubleDouble::product(simd, simd.splat_f64s(self.0), other.high)
     }
 }

@@ -1,5 +1,6 @@
 //! Least squares from the triangular factor of a regressor.
 
+use super::iterated_ridge::PASSES;
 use crate::linear::decompose::{Svd, singular_values, svd};
 use crate::{Error, Matrix};
 
@@ -28,7 +29,7 @@ pub(super) struct Solution {
 impl TriangularFactor {
     /// The minimum-norm solution over the directions whose singular value exceeds `tolerance` times the largest.
     ///
-    /// `ridge`, relative to the mean eigenvalue of `A^T A`, regularizes by three passes of iterated ridge regression,
+    /// `ridge`, relative to the mean eigenvalue of `A^T A`, regularizes by [`PASSES`] passes of iterated ridge regression,
     /// which hardly bias well excited directions.
     pub(super) fn solve(&self, tolerance: f64, ridge: f64) -> Result<Solution, Error> {
         let rank = |s: &[f64]| s.iter().take_while(|&&value| value > tolerance * s[0]).count();
@@ -44,7 +45,7 @@ impl TriangularFactor {
         let mut projected = u.columns(0, rank).tr_mul(&self.z);
         let penalty = ridge * s.iter().map(|value| value * value).sum::<f64>() / s.len() as f64;
         for (mut row, value) in projected.row_iter_mut().zip(&s) {
-            row *= (1.0 - (penalty / (penalty + value * value)).powi(3)) / value;
+            row *= (1.0 - (penalty / (penalty + value * value)).powi(PASSES)) / value;
         }
         Ok(self.solution(v.columns(0, rank) * projected, rank, s))
     }
