@@ -368,9 +368,13 @@ def test_a_second_wish_ends_the_search_at_once(client: Client, lab: Path) -> Non
 
 def test_a_process_that_dies_is_a_message(client: Client, lab: Path) -> None:
     assert client.post("search", {"files": [client.upload(lab / "long.csv")]}).status == 200
-    for one in children(os.getpid()):
-        if b"gpi_hammerstein_launcher.search" in Path(f"/proc/{one}/cmdline").read_bytes():
-            os.kill(one, signal.SIGKILL)
+    # the list of children is not complete while the thread that started one of them ends
+    found: list[int] = []
+    while not found and client.get("state").json()["search"]["state"] in RUNNING:
+        command = {one: Path(f"/proc/{one}/cmdline").read_bytes() for one in children(os.getpid())}
+        found = [one for one, words in command.items() if b"gpi_hammerstein_launcher.search" in words]
+    assert found, "no process of a search was seen"
+    os.kill(found[0], signal.SIGKILL)
     status = client.wait(lambda status: status["state"] not in RUNNING)
     assert status["state"] == "failed" and "ended with code -9" in status["message"]
 
