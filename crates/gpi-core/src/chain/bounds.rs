@@ -104,6 +104,24 @@ impl Point {
         }
     }
 
+    /// How far each unknown can be from its value, whatever the data say; infinite for most. A half-width or a threshold is
+    /// known to lie between its neighbours, because the others would take its place there.
+    pub(crate) fn spacings(&self, table: &Table) -> Vec<f64> {
+        let mut spacings = vec![f64::INFINITY; table.len];
+        for (group, range) in table.rows() {
+            if let Group::HalfWidths { .. } | Group::Thresholds { .. } = group {
+                let values = group.read(self);
+                let gap = |place: usize| (values[place] - values[place - 1]).abs();
+                for place in 1..values.len() {
+                    // the last has a neighbour on one side only
+                    let next = if place + 1 < values.len() { gap(place + 1) } else { 0.0 };
+                    spacings[range.start + place] = gap(place).max(next);
+                }
+            }
+        }
+        spacings
+    }
+
     /// The place of the widest play with a weight.
     fn widest_used(&self, input: usize) -> usize {
         self.channels[input].weights.iter().rposition(|&weight| weight > 0.0).unwrap_or(0)

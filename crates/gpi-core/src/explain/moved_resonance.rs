@@ -22,6 +22,7 @@ use crate::fit::preparation::Prepared;
 use crate::fit::representatives::Representatives;
 use crate::linear::Section;
 use crate::{Error, Experiment, Record};
+use nalgebra::DVector;
 use std::f64::consts::TAU;
 
 /// A resonance of the dynamics at one amplitude.
@@ -96,8 +97,9 @@ fn resonances(
         let sections = point.dynamics.sections.iter();
         sections.map(|section| section.poles()[0].arg().abs() * rate / TAU).collect()
     };
-    let deviations = uncertainty
-        .spread(&table.values(&point), |step| Ok(frequencies(&point.moved(step, &table))))?;
+    let (values, known) = (table.values(&point), point.spacings(&table));
+    let moved = |step: &DVector<f64>| Ok(frequencies(&point.moved(step, &table)));
+    let deviations = uncertainty.spread(&values, &known, moved)?;
     let found = frequencies(&point).into_iter().zip(deviations).zip(&point.dynamics.sections);
     let resonance = |((frequency, deviation), section): ((f64, f64), &Section)| {
         let resonates = section.order() == 2 && section.poles()[0].im != 0.0;

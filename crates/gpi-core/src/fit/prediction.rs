@@ -49,7 +49,8 @@ fn axes_of(
 
 impl Model {
     /// The model with what the [`Refinement`] that led to it on `record` knows about its errors; without it, where the
-    /// covariance cannot be expressed by the numbers of the model or is not finite.
+    /// covariance cannot be expressed by the numbers of the model or is not finite. That is a numerical weakness, of which
+    /// [`Model::prediction`] tells, and no error.
     ///
     /// ```
     /// use gpi_core::identify::{Grid, IdentifyOptions, identify};
@@ -78,10 +79,7 @@ impl Model {
         let experiments = ("record", record.experiments().len());
         let known = ("refinement", refinement.residuals.len());
         Error::require_equal("experiments", experiments, known)?;
-        let (numbers, axes) = match axes_of(&self, refinement, record) {
-            Err(Error::Mismatch { .. }) => return Ok(self),
-            found => found?,
-        };
+        let Ok((numbers, axes)) = axes_of(&self, refinement, record) else { return Ok(self) };
         let Misfit { misfit, movement } = Misfit::of(&self, refinement, record)?;
         let prediction = Prediction { numbers, axes, misfit, movement };
         self.prediction = prediction.is_finite().then_some(prediction);

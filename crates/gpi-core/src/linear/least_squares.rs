@@ -95,9 +95,16 @@ pub(crate) fn bounded(gram: &Arrow, rhs: &Vector, lower: &Vector, upper: &Vector
     let mut scaled = gram.scaled(&scale);
     scaled.set_diagonal(&scaled.diagonal().add_scalar(REGULARIZATION));
     let target = rhs.component_div(&scale);
-    let (lower, upper) = (lower.component_mul(&scale), upper.component_mul(&scale));
-    let found = pivoted(&scaled, &target, &lower, &upper);
-    found.unwrap_or_else(|| active_set(&scaled, &target, &lower, &upper)).component_div(&scale)
+    let (low, high) = (lower.component_mul(&scale), upper.component_mul(&scale));
+    let found = pivoted(&scaled, &target, &low, &high);
+    let found = found.unwrap_or_else(|| active_set(&scaled, &target, &low, &high));
+    // exactly the bound, not one that was multiplied and divided: what stands there is known to be held
+    let unscaled = |i: usize| match found[i] {
+        value if value == low[i] => lower[i],
+        value if value == high[i] => upper[i],
+        value => value / scale[i],
+    };
+    DVector::from_fn(found.len(), |i, _| unscaled(i))
 }
 
 /// The minimum by exchanges of whole sets; `None` where they do not end.
@@ -232,6 +239,20 @@ mod tests {
         let one_by_one = active_set(&gram, &rhs, &lower, &upper);
         assert!((pivoted(&gram, &rhs, &lower, &upper).unwrap() - one_by_one).amax() < 1e-10);
         assert_eq!(x[largest], upper[largest], "and an upper one");
+    }
+
+    #[test]
+    fn an_unknown_at_its_bound_is_there_exactly() {
+        // uncoupled unknowns of unequal scales, each of which would go beyond its bound
+        let n = 200;
+        let size = |i: usize| 1.0 + 0.7 * i as f64;
+        let mut gram = Arrow::zeros(n, vec![]);
+        let diagonal = Matrix::from_fn(n, n, |i, j| if i == j { size(i) } else { 0.0 });
+        gram.add_part(&diagonal, &(0..n).collect::<Vec<_>>());
+        let lower = DVector::from_fn(n, |i, _| -0.1 / (3.0 + i as f64));
+        let rhs = DVector::from_fn(n, |i, _| -size(i));
+        let found = bounded(&gram, &rhs, &lower, &DVector::from_element(n, f64::INFINITY));
+        assert_eq!(found, lower);
     }
 
     #[test]

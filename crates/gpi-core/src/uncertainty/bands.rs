@@ -53,7 +53,7 @@ impl Bands {
     ) -> Result<Vec<Vec<f64>>, Error> {
         let values = self.table.values(&self.point);
         let moved = |step: &DVector<f64>| function(&self.point.moved(step, &self.table));
-        self.uncertainty.axes(&values, moved)
+        self.uncertainty.axes(&values, &self.point.spacings(&self.table), moved)
     }
 
     /// Standard deviations of any function of the point.
@@ -63,7 +63,7 @@ impl Bands {
     ) -> Result<Vec<f64>, Error> {
         let values = self.table.values(&self.point);
         let moved = |step: &DVector<f64>| function(&self.point.moved(step, &self.table));
-        self.uncertainty.spread(&values, moved)
+        self.uncertainty.spread(&values, &self.point.spacings(&self.table), moved)
     }
 
     /// Standard deviations of the quantities of every effect.

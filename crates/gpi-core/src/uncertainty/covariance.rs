@@ -27,6 +27,7 @@
 
 use super::eigen::descending_eigen;
 use super::elimination::{Direction, Eliminated, Elimination};
+use super::prior::with_prior;
 use super::settings::CovarianceSettings;
 use crate::linear::{Arrow, ArrowGroup};
 use crate::{Error, Matrix};
@@ -193,10 +194,11 @@ impl Uncertainty {
     pub(crate) fn spread(
         &self,
         values_of: &[f64],
+        known: &[f64],
         moved: impl Fn(&DVector<f64>) -> Result<Vec<f64>, Error>,
     ) -> Result<Vec<f64>, Error> {
         let mut variances: Vec<f64> = Vec::new();
-        for axis in self.axes(values_of, moved)? {
+        for axis in self.axes(values_of, known, moved)? {
             variances.resize(axis.len(), 0.0);
             variances.iter_mut().zip(&axis).for_each(|(sum, change)| *sum += change.powi(2));
         }
@@ -204,13 +206,15 @@ impl Uncertainty {
     }
 
     /// The change of functions of the point along each principal axis of the covariance, over one standard deviation: their
-    /// covariance is the sum of the outer products. From central differences.
+    /// covariance is the sum of the outer products. From central differences, or from one side where the other one is no
+    /// valid point: a half-width near zero, of which a step would make a negative one.
     ///
     /// `values` are those of the unknowns: a step stays far below them, also along an axis that is
-    /// unidentifiable.
+    /// unidentifiable. `known` are standard deviations to which they are known without the data, infinite for most.
     pub(crate) fn axes(
         &self,
         values_of: &[f64],
+        known: &[f64],
         moved: impl Fn(&DVector<f64>) -> Result<Vec<f64>, Error>,
     ) -> Result<Vec<Vec<f64>>, Error> {
         let CovarianceSettings { step: longest, part: most, least, axes, .. } = self.settings;
@@ -218,7 +222,7 @@ impl Uncertainty {
         let reach = |value: f64| most * value.abs().max(least * largest);
         // Zero for an unknown that is held: rounding must not move it off its place, such as the
         // threshold zero, on whose two sides the deadzone is another one.
-        let factor = self.whole_factor();
+        let factor = with_prior(self.whole_factor(), known);
         let lengths = factor.row_iter().map(|row| row.norm());
         let divisor = DVector::from_iterator(
             self.unknowns,
@@ -236,8 +240,14 @@ impl Uncertainty {
                 .map(|(part, value)| reach(*value) / part.abs())
                 .fold(longest, f64::min);
             let step = deviation * fraction;
-            let (above, below) = (moved(&step)?, moved(&-step)?);
-            let change = |(above, below): (&f64, &f64)| (above - below) / (2.0 * fraction);
+            let here = || moved(&DVector::zeros(self.unknowns));
+            let (above, below, length) = match (moved(&step), moved(&-step)) {
+                (Ok(above), Ok(below)) => (above, below, 2.0 * fraction),
+                (Ok(above), Err(_)) => (above, here()?, fraction),
+                (Err(_), Ok(below)) => (here()?, below, fraction),
+                (Err(error), Err(_)) => return Err(error),
+            };
+            let change = |(above, below): (&f64, &f64)| (above - below) / length;
             Ok(above.iter().zip(&below).map(change).collect())
         };
         values.iter().enumerate().take_while(|(_, value)| **value > axes).map(along).collect()
@@ -297,6 +307,29 @@ mod tests {
         let expected = &inverse * scores.select(&free) * &inverse;
         assert!((found.covariance(&free) - expected).amax() < 1e-11);
         assert_eq!(found.covariance(&[1, 4, 7]), Matrix::zeros(3, 3));
+    }
+
+    #[test]
+    fn changes_are_known_from_the_side_that_is_valid() {
+        let (gram, scores) = arrows();
+        let free: Vec<usize> = (0..9).collect();
+        let settings = CovarianceSettings::default();
+        let found = Uncertainty::new(settings, &gram, &scores, &free, 1.0, 1.0);
+        let sum = |step: &DVector<f64>| Ok(vec![step.sum()]);
+        // on one side of every axis the first unknown would be negative
+        let positive = |step: &DVector<f64>| {
+            Error::require(step[0] >= 0.0, "first", step[0], "must be positive")?;
+            sum(step)
+        };
+        let (values, known) = ([1.0; 9], [f64::INFINITY; 9]);
+        let expected = found.spread(&values, &known, sum).unwrap()[0];
+        let one_sided = found.spread(&values, &known, positive).unwrap()[0];
+        assert!((one_sided / expected - 1.0).abs() < 1e-9, "{one_sided} {expected}");
+        let never = |_: &DVector<f64>| {
+            Error::require(false, "first", 1.0, "must not exist")?;
+            Ok(vec![])
+        };
+        assert!(found.spread(&values, &known, never).is_err());
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub(crate) mod noise_floor;
 pub(crate) mod noise_model;
 pub(crate) mod outliers;
 mod prediction;
+mod prior;
 pub(crate) mod settings;
 
 pub use bands::{Bands, PoleDeviations, ResponseDeviation};
