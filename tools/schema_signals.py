@@ -57,6 +57,17 @@ COMPENSATION = closed(
         "files": FILES,
     }
 )
+COUNTS: Schema = of("object", "how often each of them occurs", additionalProperties=count())
+BATCH = closed(
+    {
+        "schema": {"const": "gpi-batch/1"},
+        "records": count("rows of the table"),
+        "failed": count("records without a result"),
+        "verdicts": COUNTS,
+        "effects": COUNTS,
+        "table": text("file of the table, which has the schema `gpi-fleet/1`"),
+    }
+)
 EXCITATION = closed(
     {
         "schema": {"const": "gpi-excitation/1"},

@@ -25,6 +25,7 @@ SCHEMAS: dict[str, tuple[str, Schema]] = {
     "gpi-compensation/1": ("The result of `gpi compensate`", signals.COMPENSATION),
     "gpi-inspection/1": ("The result of `gpi inspect`", signals.INSPECTION),
     "gpi-excitation/1": ("The result of `gpi excite`", signals.EXCITATION),
+    "gpi-batch/1": ("The result of `gpi batch`", signals.BATCH),
     "gpi-demo/1": ("The result of `gpi demo`", results.DEMO),
     "gpi-reproduction/1": ("The result of `gpi reproduce`", results.REPRODUCTION),
     "gpi-datasets": ("The result of `gpi datasets list`", signals.DATASETS),

@@ -76,6 +76,7 @@ from gpi_hammerstein.summary import Parameter, Summary
 
 if _CHECKED:
     from gpi_hammerstein import datasets, interop, plot
+    from gpi_hammerstein.fleet import batch
 
 __all__ = [
     "Comparison",
@@ -105,6 +106,7 @@ __all__ = [
     "StateSpace",
     "Summary",
     "__version__",
+    "batch",
     "datasets",
     "decaying_triangle",
     "effect_names",
@@ -138,14 +140,16 @@ register()
 
 
 def __getattr__(name: str) -> _Any:
-    """Load `plot` (and with it Matplotlib), `interop` and `datasets` when they are first used."""
-    if name in ("plot", "interop", "datasets"):
-        import importlib
+    """Load `plot` (and with it Matplotlib), `interop`, `datasets` and `batch` when they are first used."""
+    import importlib
 
+    if name in ("plot", "interop", "datasets"):
         return importlib.import_module(f"gpi_hammerstein.{name}")
+    if name == "batch":
+        return importlib.import_module("gpi_hammerstein.fleet").batch
     raise AttributeError(f"module `gpi_hammerstein` has no attribute `{name}`")
 
 
 def __dir__() -> list[str]:
-    """Return the public names; `plot`, `interop` and `datasets` are among them before they are loaded."""
+    """Return the public names; those that `__getattr__` loads are among them before they are loaded."""
     return sorted(__all__)

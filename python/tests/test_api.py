@@ -26,7 +26,7 @@ SAME_SHAPE = re.compile(r"\b(?:shaped like|the shape of) \w+")
 
 UNITS = {
     "of a signal": r"\b[Ii]n (?:[\w']+ ){0,4}units?\b(?! (?:circle|DC))|in ``unit``",
-    "named": r"\b(?:Hz|seconds|in s|in samples|per second|radians|rad|dB|percent)\b",
+    "named": r"\b(?:Hz|seconds|in s|in samples|per second|radians|rad|dB|percent|GiB)\b",
     "none": r"\b(?:no unit|(?:a|the|what) (?:fraction|ratio|share|count)|pure numbers?)\b",
 }
 UNIT = re.compile("|".join(UNITS.values()))

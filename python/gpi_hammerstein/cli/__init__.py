@@ -10,6 +10,7 @@ import typer
 
 from gpi_hammerstein._native import DataError, ParameterError, __version__
 from gpi_hammerstein.cli.app import app as app_command
+from gpi_hammerstein.cli.batch import batch
 from gpi_hammerstein.cli.compensate import compensate
 from gpi_hammerstein.cli.datasets import datasets
 from gpi_hammerstein.cli.demo import demo
@@ -61,6 +62,7 @@ EXAMPLES: dict[Callable[..., Any], str] = {
     identify: "gpi identify run.csv --input u_V --output y_um -o model",
     explain: "gpi explain run.csv --holdout-record other.csv -o explained --report",
     report: "gpi report run.csv",
+    batch: "gpi batch runs -o fleet",
     simulate: "gpi simulate model/model.json drive.csv -o prediction",
     validate: "gpi validate model/model.json other.csv -o check",
     compensate: "gpi compensate model/model.json path.csv --limits -10,150 -o drive",
