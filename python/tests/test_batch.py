@@ -8,7 +8,9 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -168,6 +170,21 @@ def test_results_are_no_records(records: Path, tmp_path: Path) -> None:
     for _ in range(2):
         table = gpi.batch(folder, out=folder / "fleet", workers=1, **QUICK)
         assert len(table) == 3
+
+
+def test_paths_may_be_relative(records: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(records / "a")
+
+    class Elsewhere(ThreadPoolExecutor):
+        """A worker with another current folder."""
+
+        def submit(self, *arguments: Any, **named: Any) -> Any:
+            monkeypatch.chdir(tmp_path)
+            return super().submit(*arguments, **named)
+
+    with Elsewhere(1) as executor:
+        table = gpi.batch("run0.csv", out=tmp_path / "fleet", executor=executor, **QUICK)
+    assert table.select("file", "error").rows() == [("run0.csv", None)]
 
 
 def test_names_differ() -> None:

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import Executor
 from contextlib import closing
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -184,7 +185,9 @@ def _planned(found: list[jobs.Job], folder: Path, report: bool) -> tuple[_Rows, 
         elif key not in tasks:
             # another record, or other options, have used the name before
             free = name if name not in taken else f"{name}-{key[:8]}"
-            tasks[key] = Task(job, key, folder / free, report)
+            # a worker may have another current folder
+            absolute = replace(job, file=job.file.absolute())
+            tasks[key] = Task(absolute, key, folder.absolute() / free, report)
     return rows, list(tasks.values())
 
 
