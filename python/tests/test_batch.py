@@ -91,6 +91,13 @@ def test_a_record_that_cannot_be_read_is_a_row(records: Path, finished: tuple[Pa
     assert failed["verdict"].to_list() == [None]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
+def test_a_pipe_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.csv")
+    table = gpi.batch(tmp_path / "pipe.csv", out=tmp_path / "fleet", workers=1, **QUICK)
+    assert "is not a regular file" in table["error"][0]
+
+
 def test_the_same_data_share_a_result(records: Path, finished: tuple[Path, pl.DataFrame]) -> None:
     table = finished[1]
     shared = table.filter(pl.col("file").is_in([str(records / "a/run1.csv"), str(records / "b/copy.csv")]))

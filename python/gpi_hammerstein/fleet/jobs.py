@@ -53,6 +53,8 @@ class Job:
             The file cannot be read.
         """
         content = hashlib.sha256()
+        if self.file.exists() and not self.file.is_file():
+            raise DataError(f"{self.file}: is not a regular file")  # a pipe or a device may never end
         try:
             with self.file.open("rb") as source:
                 while block := source.read(BLOCK):

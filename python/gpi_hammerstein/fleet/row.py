@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import polars as pl
 
 from gpi_hammerstein._native import Explanation, __version__
 from gpi_hammerstein.explanation import to_dict
 from gpi_hammerstein.fleet.jobs import Job
+from gpi_hammerstein.json_values import plain
 
 VERSION = "gpi-fleet/1"
 SIZE = pl.Struct(
@@ -91,7 +91,7 @@ def of_explanation(job: Job, name: str, key: str, found: Explanation, seconds: f
         simple model on the same data. `sensitivity` and `hysteresis_width` are those of the first input and
         output.
     """
-    result = to_dict(found)
+    result = plain(to_dict(found))
     record, stage = found.record, result["stage"]
     units = set(record.output_units)
     rivals = [rival for rival in result["rivals"] if rival["holdout_rms"] is not None]
@@ -112,9 +112,9 @@ def of_explanation(job: Job, name: str, key: str, found: Explanation, seconds: f
                 if step["effect"] is not None
                 for label, parameter in step["parameters"].items()
             ],
-            "rms_before": _finite(result["error"]["before"]["holdout"]["rms"]),
-            "rms_after": _finite(result["error"]["after"]["holdout"]["rms"]),
-            "noise_floor": _finite(result["noise_floor"]["rms"]),
+            "rms_before": result["error"]["before"]["holdout"]["rms"],
+            "rms_after": result["error"]["after"]["holdout"]["rms"],
+            "noise_floor": result["noise_floor"]["rms"],
             "unit": units.pop() if len(units) == 1 else "",
             "rival": best.get("name"),
             "rival_rms": best.get("holdout_rms"),
@@ -155,7 +155,3 @@ def _common(job: Job, name: str) -> dict[str, Any]:
         "date": job.date,
         "version": __version__,
     }
-
-
-def _finite(value: float | None) -> float | None:
-    return None if value is None or not np.isfinite(value) else float(value)

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import replace
@@ -59,11 +59,11 @@ def batch(
         An executor with the interface of `concurrent.futures`, or a ``dask.distributed.Client``. All its
         workers must see the same files. If None, processes on this machine.
     workers
-        Number of processes; None for one for each processor.
+        Number of processes; None for one for each processor. An `executor` has its own workers.
     threads
-        Threads of each process.
+        Threads of each process, without an `executor`.
     memory
-        Memory that each process may take, in GiB.
+        Memory that each process may take, in GiB, without an `executor`.
     report
         Whether each record gets a report.html.
     progress
@@ -109,11 +109,14 @@ def batch(
         worked = engine.with_executor(tasks, _executor(executor))
     else:
         worked = engine.in_processes(tasks, engine.Processes(workers or os.cpu_count() or 1, threads, memory))
+    known_before, tell = len(found) - len(tasks), _told(progress, len(found))
     written = time.monotonic()
     with closing(worked):
         try:
-            for _, known in _counted(worked, len(tasks), len(found), progress):
+            tell(known_before)
+            for ready, (_, known) in enumerate(worked, known_before + 1):
                 rows.results[known["key"]] = known
+                tell(ready)
                 if time.monotonic() - written > PERIOD:
                     _write(target, rows.table())
                     written = time.monotonic()
@@ -203,20 +206,9 @@ def _executor(given: Any) -> Executor:
     )
 
 
-def _counted(
-    worked: Iterable[tuple[Task, dict[str, Any]]],
-    tasks: int,
-    every: int,
-    progress: Callable[[int, int], None] | None,
-) -> Generator[tuple[Task, dict[str, Any]], None, None]:
-    ready = every - tasks
-    if progress is not None:
-        progress(ready, every)
-    for task, known in worked:
-        ready += 1
-        yield task, known
-        if progress is not None:
-            progress(ready, every)
+def _told(progress: Callable[[int, int], None] | None, every: int) -> Callable[[int], None]:
+    """Return a function that tells how many records are done."""
+    return lambda ready: None if progress is None else progress(ready, every)
 
 
 def _write(target: str | os.PathLike[str], table: pl.DataFrame) -> None:

@@ -116,6 +116,3 @@ def _complete(path: Path, key: str | None = None) -> dict[str, Any] | None:
         return None
     known = table.row(0, named=True)
     return known if key in (None, known["key"]) else None
-
-
-__all__ = ["Task", "done", "work"]
