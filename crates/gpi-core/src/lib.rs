@@ -42,6 +42,8 @@ pub mod linear;
 #[cfg(feature = "identify")]
 mod model;
 #[cfg(feature = "identify")]
+pub mod monitor;
+#[cfg(feature = "identify")]
 mod optimize;
 #[cfg(feature = "identify")]
 mod parallel;

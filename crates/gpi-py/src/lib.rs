@@ -12,6 +12,7 @@ mod figures;
 mod identify;
 mod linear;
 mod model;
+mod monitor;
 mod operators;
 mod plotting;
 mod progress;
@@ -31,6 +32,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     record::register(module)?;
     model::register(module)?;
     compensate::register(module)?;
+    monitor::register(module)?;
     identify::register(module)?;
     explain::register(module)?;
     rivals::register(module)?;

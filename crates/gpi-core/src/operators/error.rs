@@ -29,6 +29,11 @@ pub enum OperatorError {
         /// Position of the element, from 0.
         index: usize,
     },
+    /// A number must be positive, but is zero.
+    Zero {
+        /// Its name.
+        parameter: &'static str,
+    },
     /// The operator has no inverse: its output does not increase with its input.
     NotRising {
         /// Name of the array of weights.
@@ -70,6 +75,7 @@ impl fmt::Display for OperatorError {
             Self::Negative { parameter, index } => {
                 write!(f, "`{parameter}`[{index}] is negative; it must be zero or positive")
             }
+            Self::Zero { parameter } => write!(f, "`{parameter}` is zero; it must be positive"),
             Self::NotRising { parameter, index, slope } => write!(
                 f,
                 "`{parameter}`: the elements up to index {index} sum to a slope of {slope:e}, but an inverse needs \

@@ -1,5 +1,5 @@
 //! Operators in the order of the signal flow: deadzones, plays, their cascade, first-order lags and linear dynamics;
-//! then the inverse operators, which compute the drive for a reference.
+//! then the inverse operators, which compute the drive for a reference, and the monitor of a model's residual.
 //!
 //! Configuration (half-widths, thresholds, weights) and state are separate: one configuration may serve any number of
 //! channels. [`Operator::step`] defines an operator. The block forms compute the same outputs for a whole record.
@@ -11,6 +11,7 @@ mod deadzones;
 mod error;
 mod inverse;
 mod lags;
+mod monitor;
 mod plays;
 mod state_space;
 mod storage;
@@ -20,6 +21,9 @@ pub use deadzones::{Deadzones, DeadzonesState, Reading};
 pub use error::OperatorError;
 pub use inverse::{Compensator, CompensatorState, Curve, Faults, InverseGpi, InverseState};
 pub use lags::{Lags, LagsState};
+pub use monitor::{
+    Agreed, Limits, Merge, Moments, Regression, ResidualMonitor, ResidualMonitorState, Windows,
+};
 pub use plays::{PlayBank, PlayBankState, play};
 pub use state_space::StateSpaceStep;
 pub use storage::{Sample, Storage};

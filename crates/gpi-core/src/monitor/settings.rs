@@ -1,0 +1,52 @@
+//! How a machine is monitored.
+
+use crate::Error;
+use crate::settings::{FROM_ONE, PART, POSITIVE, settings};
+
+settings! {
+    /// How a machine is monitored. Numbers without another reason were chosen by hand.
+    struct MonitorSettings {
+        /// Length of a block in seconds. A change is noticed after two blocks at the earliest.
+        seconds: f64 = 1.0, POSITIVE;
+        /// Samples of a block at least, so that its sums are close to normal.
+        samples: usize = 100, FROM_ONE;
+        /// The smallest part by which the noise must have changed: its size in the training record is itself uncertain.
+        least_noise: f64 = 0.1, PART;
+        /// The part of the noise that a slow error of the model may have although the training record does not show it: its
+        /// mean autocovariance over L lags of N samples is then two standard errors at N L = 640,000.
+        hidden: f64 = 0.05, PART;
+        /// The smallest root mean square of a new line as a part of the noise, because the training record may contain weaker
+        /// lines that are not in the model; and the part of the model's own motion at a frequency that counts as the motion's.
+        least_line: f64 = 0.3, PART;
+        /// Blocks of a frame whose spectrum is taken.
+        frame: usize = 4, FROM_ONE;
+        /// Ratio of the misfit on data that the fit has not seen to that on the training data, as for the expected error of a
+        /// compensation.
+        unseen: f64 = 2.0, FROM_ONE;
+        /// Models drawn from the covariance of the parameters: the mean square of their differences from the model is the
+        /// variance of its output.
+        draws: usize = 3, FROM_ONE;
+        /// Standard deviations of the parameters that are possible.
+        deviations: f64 = 2.0, FROM_ONE;
+        /// The part by which a parameter is moved for the derivative of the output.
+        step: f64 = 1e-3, PART;
+        /// The part to which a transient of the dynamics has decayed when the first sample counts, and the blocks that
+        /// this may take at most.
+        decayed: f64 = 1e-4, PART;
+        waiting: usize = 20, FROM_ONE;
+        /// The difference between starts below which it is forgotten, as a part of the noise.
+        forgotten: f64 = 1e-3, PART;
+        /// Blocks that are kept one by one; more are kept in pairs, then in fours, and so on.
+        history: usize = 32_768, 16.0..=1e9;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_valid() {
+        assert!(MonitorSettings::default().validate().is_ok());
+    }
+}
