@@ -1,10 +1,14 @@
 """The main properties of a stage: sensitivity, width of the hysteresis loop, first resonance."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gpi_hammerstein._native import Model, Record
+
+Range = tuple[float, float]  # lowest and highest value of an input
 
 # Number of samples of each branch of the loop.
 BRANCH = 500
@@ -41,11 +45,27 @@ def stage(model: Model, record: Record) -> dict[str, Any]:
     >>> stage(found.model, record)["first_resonance"]  # doctest: +SKIP
     {'frequency_hz': 812.3, 'damping': 0.021}
     """
-    gain = model.linear.dc_gain
-    loops = []
+    found = loops(model, input_ranges(record), model.linear.dc_gain)
+    return {"loops": found, "first_resonance": first_resonance(model)}
+
+
+def input_ranges(record: Record) -> list[Range]:
+    """Return the smallest and the largest value of each input of a record."""
+    lows, highs = (np.array([end(u, axis=0) for u in record.u]) for end in (np.min, np.max))
+    return [(float(low), float(high)) for low, high in zip(lows.min(axis=0), highs.max(axis=0), strict=True)]
+
+
+def loops(model: Model, ranges: Sequence[Range | None], gain: NDArray[np.float64]) -> list[dict[str, Any]]:
+    """Return the loops of slow motion, with all outputs, of every input whose range is given.
+
+    `gain` is the DC gain of the linear part, shape (outputs, inputs).
+    """
+    found = []
     for i, (name, unit) in enumerate(zip(model.input_names, model.input_units, strict=True)):
-        low = min(float(u[:, i].min()) for u in record.u)
-        high = max(float(u[:, i].max()) for u in record.u)
+        own = ranges[i]
+        if own is None:
+            continue
+        low, high = own
         rise, fall = np.linspace(low, high, BRANCH), np.linspace(high, low, BRANCH)
         # the first cycle removes the influence of the initial state
         v = model.hysteresis[i](np.concatenate([rise, fall, rise, fall]))
@@ -53,7 +73,7 @@ def stage(model: Model, record: Record) -> dict[str, Any]:
         travel = float(up[-1] - up[0])
         width = float(np.abs(down - up).max() / abs(travel)) if travel else 0.0
         for o, (output, output_unit) in enumerate(zip(model.output_names, model.output_units, strict=True)):
-            loops.append(
+            found.append(
                 {
                     "input": name,
                     "output": output,
@@ -63,18 +83,21 @@ def stage(model: Model, record: Record) -> dict[str, Any]:
                     "width": width,
                 }
             )
-    return {"loops": loops, "first_resonance": first_resonance(model)}
+    return found
 
 
 def first_resonance(model: Model) -> dict[str, float] | None:
     """Return the lowest natural frequency of a pair of poles that shows a peak, and its damping ratio."""
-    found = []
-    for pole in model.linear.poles:
-        if pole.imag > 0:
-            frequency, damping = natural(pole, model.rate)
-            if damping < DAMPED:
-                found.append({"frequency_hz": frequency, "damping": damping})
-    return min(found, key=lambda one: one["frequency_hz"]) if found else None
+    found = [natural(pole, model.rate) for pole in resonant_poles(model)]
+    return dict(zip(("frequency_hz", "damping"), found[0], strict=True)) if found else None
+
+
+def resonant_poles(model: Model) -> list[complex]:
+    """Return one pole of each pair that shows a peak, the lowest natural frequency first."""
+    upper = [complex(pole) for pole in model.linear.poles if pole.imag > 0]
+    known = [(natural(pole, model.rate), pole) for pole in upper]
+    peaks = [(frequency, pole) for (frequency, damping), pole in known if damping < DAMPED]
+    return [pole for _, pole in sorted(peaks, key=lambda one: one[0])]
 
 
 def natural(pole: complex, rate: float) -> tuple[float, float]:

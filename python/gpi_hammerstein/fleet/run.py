@@ -128,8 +128,8 @@ def batch(
 class _Rows:
     """The rows of all jobs, in their order; those of unfinished jobs are missing."""
 
-    def __init__(self, found: list[jobs.Job], names: list[str]) -> None:
-        self.jobs, self.names = found, names
+    def __init__(self, found: list[jobs.Job]) -> None:
+        self.jobs = found
         self.keys: list[str | None] = []
         self.failed: dict[int, dict[str, Any]] = {}
         self.results: dict[str | None, dict[str, Any]] = {}
@@ -173,9 +173,9 @@ def _planned(found: list[jobs.Job], folder: Path, report: bool) -> tuple[_Rows, 
     """Return the rows that are known, and what is left to do: every result once."""
     known = done(folder)
     taken = {one["name"] for one in known.values()}
-    rows = _Rows(found, jobs.names(found))
+    rows = _Rows(found)
     tasks: dict[str, Task] = {}
-    for place, (job, name) in enumerate(zip(found, rows.names, strict=True)):
+    for place, (job, name) in enumerate(zip(found, jobs.names(found), strict=True)):
         try:
             key = job.key()
         except DataError as error:

@@ -1,6 +1,5 @@
 """One record of a batch, in a worker process: read, explain, write."""
 
-import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +12,8 @@ from gpi_hammerstein._native import GpiError, explain
 from gpi_hammerstein.explanation import to_dict
 from gpi_hammerstein.fleet import row
 from gpi_hammerstein.fleet.jobs import Job
-from gpi_hammerstein.io import read_record
-from gpi_hammerstein.json_values import plain
+from gpi_hammerstein.io.read import read_recording
+from gpi_hammerstein.json_values import write_json
 
 ROW = "row.parquet"
 
@@ -59,8 +58,8 @@ def work(task: Task) -> dict[str, Any]:
 def _work(task: Task, started: float) -> dict[str, Any]:
     job, name = task.job, task.folder.name
     try:
-        record = read_record(job.file, **job.read)
-        found = explain(record, **job.choices)
+        recording = read_recording(job.file, **job.read)
+        found = explain(recording.record(), **job.choices)
     except GpiError as error:
         seconds = time.monotonic() - started
         failed = row.of_failure(job, name, task.key, str(error), seconds)
@@ -73,13 +72,17 @@ def _work(task: Task, started: float) -> dict[str, Any]:
     with files.staged(task.folder) as folder:
         files.save_model(found.model, folder / "model.json")
         result = to_dict(found)
-        result["record"]["files"] = [str(job.file)]
-        text = json.dumps(plain(result), allow_nan=False, indent=2) + "\n"
-        (folder / "explanation.json").write_text(text, encoding="utf-8")
+        result["record"] |= {
+            "files": [str(job.file)],
+            "experiments": len(recording.runs),
+            "notes": recording.notes,
+        }
+        write_json(result, folder / "explanation.json")
         if task.report:
             from gpi_hammerstein.report import report_html
 
-            page = report_html(found, command=f"gpi explain {job.file}", notes=[], model_file="model.json")
+            command = f"gpi explain {job.file}"
+            page = report_html(found, command=command, notes=recording.notes, model_file="model.json")
             (folder / "report.html").write_text(page, encoding="utf-8")
         row.table([known]).write_parquet(folder / ROW)
     return known
