@@ -11,7 +11,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import schema_results as results  # noqa: E402
 import schema_signals as signals  # noqa: E402
+from schema_comparisons import COMPARISON  # noqa: E402
 from schema_model import MODEL  # noqa: E402
+from schema_monitor import MONITOR  # noqa: E402
 from schema_parts import Schema, all_of_file  # noqa: E402
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "reference" / "schemas"
@@ -26,6 +28,8 @@ SCHEMAS: dict[str, tuple[str, Schema]] = {
     "gpi-inspection/1": ("The result of `gpi inspect`", signals.INSPECTION),
     "gpi-excitation/1": ("The result of `gpi excite`", signals.EXCITATION),
     "gpi-batch/1": ("The result of `gpi batch`", signals.BATCH),
+    "gpi-comparison/1": ("The result of `gpi compare`", COMPARISON),
+    "gpi-monitor/1": ("The result of `gpi monitor`", MONITOR),
     "gpi-demo/1": ("The result of `gpi demo`", results.DEMO),
     "gpi-reproduction/1": ("The result of `gpi reproduce`", results.REPRODUCTION),
     "gpi-datasets": ("The result of `gpi datasets list`", signals.DATASETS),

@@ -34,6 +34,7 @@ from gpi_hammerstein._native import (
     IntermediateSignal,
     InverseGpi,
     Model,
+    Monitor,
     NoncausalFir,
     NumericalError,
     ParameterError,
@@ -65,6 +66,7 @@ from gpi_hammerstein.export import (
     export_mat,
     export_model_c,
     export_model_rust,
+    export_monitor_c,
     export_rust,
 )
 from gpi_hammerstein.files import load_model as load
@@ -76,7 +78,20 @@ from gpi_hammerstein.summary import Parameter, Summary
 
 if _CHECKED:
     from gpi_hammerstein import datasets, interop, plot
+    from gpi_hammerstein.difference import (
+        Difference,
+        EffectFrequency,
+        FigureDifference,
+        FleetDifferences,
+        ModelDifferences,
+        SimulatedDifference,
+        compare,
+        compare_fleets,
+    )
     from gpi_hammerstein.fleet import batch
+    from gpi_hammerstein.fleet.trends import fleet_trends
+    from gpi_hammerstein.fleet.unusual import unusual_devices
+    from gpi_hammerstein.report.fleet import fleet_report
 
 __all__ = [
     "Comparison",
@@ -84,9 +99,13 @@ __all__ = [
     "Compensator",
     "DataError",
     "Deadzones",
+    "Difference",
+    "EffectFrequency",
     "Explanation",
+    "FigureDifference",
     "Fir",
     "FirStatistic",
+    "FleetDifferences",
     "Gpi",
     "GpiError",
     "HysteresisFit",
@@ -95,6 +114,8 @@ __all__ = [
     "IntermediateSignal",
     "InverseGpi",
     "Model",
+    "ModelDifferences",
+    "Monitor",
     "NoncausalFir",
     "NumericalError",
     "Parameter",
@@ -103,10 +124,13 @@ __all__ = [
     "Progress",
     "Record",
     "Refinement",
+    "SimulatedDifference",
     "StateSpace",
     "Summary",
     "__version__",
     "batch",
+    "compare",
+    "compare_fleets",
     "datasets",
     "decaying_triangle",
     "effect_names",
@@ -117,9 +141,12 @@ __all__ = [
     "export_mat",
     "export_model_c",
     "export_model_rust",
+    "export_monitor_c",
     "export_rust",
     "fir",
     "fit_hysteresis",
+    "fleet_report",
+    "fleet_trends",
     "held_steps",
     "identify",
     "inspect",
@@ -134,19 +161,33 @@ __all__ = [
     "rivals",
     "save",
     "sensitivities",
+    "unusual_devices",
 ]
 
 register()
 
+_OF_DIFFERENCE = (
+    *("Difference", "EffectFrequency", "FigureDifference", "FleetDifferences"),
+    *("ModelDifferences", "SimulatedDifference", "compare", "compare_fleets"),
+)
+_OF_FLEET = {
+    "batch": "fleet",
+    "fleet_report": "report.fleet",
+    "fleet_trends": "fleet.trends",
+    "unusual_devices": "fleet.unusual",
+}
+
 
 def __getattr__(name: str) -> _Any:
-    """Load `plot` (and with it Matplotlib), `interop`, `datasets` and `batch` when they are first used."""
+    """Load modules and functions of which few programs need all, such as `plot`, at their first use."""
     import importlib
 
     if name in ("plot", "interop", "datasets"):
         return importlib.import_module(f"gpi_hammerstein.{name}")
-    if name == "batch":
-        return importlib.import_module("gpi_hammerstein.fleet").batch
+    if name in _OF_DIFFERENCE:
+        return getattr(importlib.import_module("gpi_hammerstein.difference"), name)
+    if name in _OF_FLEET:
+        return getattr(importlib.import_module(f"gpi_hammerstein.{_OF_FLEET[name]}"), name)
     raise AttributeError(f"module `gpi_hammerstein` has no attribute `{name}`")
 
 

@@ -1,12 +1,14 @@
 """Results as values that JSON can represent."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-__all__ = ["plain"]
+__all__ = ["plain", "write_json"]
 
 
 def plain(value: Any) -> Any:
@@ -24,3 +26,8 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def write_json(result: Mapping[str, Any], path: Path) -> None:
+    """Write one JSON object to a file, in an indented form."""
+    path.write_text(json.dumps(plain(result), allow_nan=False, indent=2) + "\n", encoding="utf-8")

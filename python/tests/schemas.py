@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
+from gpi_hammerstein import json_values
 from gpi_hammerstein.cli import output
 from gpi_hammerstein.files import models
 
@@ -35,7 +36,7 @@ def require(value: Any, name: str | None = None) -> None:
 
 def watch(patch: pytest.MonkeyPatch) -> None:
     """Check every result that a command prints or writes, and every model file that is saved."""
-    plain, write = output.plain, models.write_atomically
+    plain, write = json_values.plain, models.write_atomically
 
     def checked(value: Any) -> Any:
         result = plain(value)
@@ -48,4 +49,5 @@ def watch(patch: pytest.MonkeyPatch) -> None:
         write(path, content)
 
     patch.setattr(output, "plain", checked)
+    patch.setattr(json_values, "plain", checked)
     patch.setattr(models, "write_atomically", checked_model)

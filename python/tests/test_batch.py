@@ -79,8 +79,22 @@ def test_a_row_says_what_explain_says(records: Path, finished: tuple[Path, pl.Da
     assert known["rate_hz"] == pytest.approx(1000)
     folder = out / "records" / known["name"]
     assert sorted(file.name for file in folder.iterdir()) == ["explanation.json", "model.json", "row.parquet"]
-    schemas.require(json.loads((folder / "explanation.json").read_text()), "gpi-explanation/1")
+    explanation = json.loads((folder / "explanation.json").read_text())
+    schemas.require(explanation, "gpi-explanation/1")
+    assert explanation["record"]["files"] == [str(records / "a/run2.csv")]
+    assert explanation["record"]["experiments"] == 1
     assert gpi.load(folder / "model.json").rate == pytest.approx(1000)
+
+
+def test_notes_of_the_reading_are_kept(tmp_path: Path) -> None:
+    path = write_record(tmp_path / "run.csv", 1)
+    table = pl.read_csv(path).rename({"u_V": "voltage_V", "y_um": "position_um"})
+    table.write_csv(path)
+    gpi.batch(path, out=tmp_path / "fleet", workers=1, report=True, **QUICK)
+    folder = tmp_path / "fleet/records/run"
+    notes = json.loads((folder / "explanation.json").read_text())["record"]["notes"]
+    assert any("voltage_V" in note for note in notes)
+    assert "voltage_V" in (folder / "report.html").read_text()
 
 
 def test_a_record_that_cannot_be_read_is_a_row(records: Path, finished: tuple[Path, pl.DataFrame]) -> None:
@@ -251,7 +265,7 @@ def test_a_failure_of_the_machine_is_not_kept(
 
     task = work.Task(Job(records / "a/run0.csv", choices=QUICK), "key", tmp_path / "run0")
     with monkeypatch.context() as patch:
-        patch.setattr(work, "read_record", fail)
+        patch.setattr(work, "read_recording", fail)
         assert str(problem) in work.work(task)["error"]
     assert not task.folder.exists()
     assert work.work(task)["error"] is None

@@ -11,6 +11,7 @@ import typer
 from gpi_hammerstein._native import DataError, ParameterError, __version__
 from gpi_hammerstein.cli.app import app as app_command
 from gpi_hammerstein.cli.batch import batch
+from gpi_hammerstein.cli.compare import compare
 from gpi_hammerstein.cli.compensate import compensate
 from gpi_hammerstein.cli.datasets import datasets
 from gpi_hammerstein.cli.demo import demo
@@ -20,6 +21,7 @@ from gpi_hammerstein.cli.export import export
 from gpi_hammerstein.cli.help import Command, Group
 from gpi_hammerstein.cli.identify import identify
 from gpi_hammerstein.cli.inspect import inspect
+from gpi_hammerstein.cli.monitor import monitor
 from gpi_hammerstein.cli.output import complain
 from gpi_hammerstein.cli.report import report
 from gpi_hammerstein.cli.reproduce import reproduce
@@ -36,7 +38,8 @@ app: typer.Typer = typer.Typer(
     pretty_exceptions_enable=False,
     help="Identify piezo and other smart-material actuators from measured data.\n\n"
     "To start, run `gpi demo`. Then run `gpi inspect` with a record of your own.",
-    epilog="Exit codes: 0 success, 2 wrong call, 3 unusable data, 130 interrupted, 143 terminated, "
+    epilog="Exit codes: 0 success, 2 wrong call, 3 unusable data, 4 the machine has changed (monitor), 130 "
+    "interrupted, 143 terminated, "
     "1 any other error.",
 )
 
@@ -65,6 +68,8 @@ EXAMPLES: dict[Callable[..., Any], str] = {
     batch: "gpi batch runs -o fleet",
     simulate: "gpi simulate model/model.json drive.csv -o prediction",
     validate: "gpi validate model/model.json other.csv -o check",
+    monitor: "gpi monitor model/model.json today.csv",
+    compare: "gpi compare old/model.json new/model.json run.csv",
     compensate: "gpi compensate model/model.json path.csv --limits -10,150 -o drive",
     export: "gpi export model/model.json --limits -10,150 --c compensator",
     app_command: "gpi app",

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import polars as pl
 import typer
@@ -55,33 +55,13 @@ def batch(
     resample: options.Resample = None,
     warmup: options.Warmup = None,
     experiments: options.Experiments = None,
-    effects: Annotated[
-        str | None,
-        typer.Option(
-            help="Effects that may be added, separated by commas. Default: all. `none`: no effect.",
-            metavar="A,B",
-        ),
-    ] = None,
-    require: Annotated[
-        str | None,
-        typer.Option(
-            help="Effects that are added even if they are not significant, separated by commas.",
-            metavar="A,B",
-        ),
-    ] = None,
-    order: Annotated[int | None, typer.Option(min=1, help="Order of the linear part.")] = None,
-    half_widths: Annotated[
-        str | None, typer.Option(help="Number of plays, or their half-widths.", metavar="N|R1,R2,..")
-    ] = None,
-    thresholds: Annotated[
-        str | None, typer.Option(help="Number of deadzones, or their thresholds.", metavar="N|H1,H2,..")
-    ] = None,
-    delay: Annotated[
-        int | None, typer.Option(min=0, help="Use a gain with this delay, in samples, as the linear part.")
-    ] = None,
-    reading: Annotated[
-        Literal["one-sided", "directional"], typer.Option(help="Deadzone convention.")
-    ] = "one-sided",
+    effects: options.Effects = None,
+    require: options.Require = None,
+    order: options.Order = None,
+    half_widths: options.HalfWidths = None,
+    thresholds: options.Thresholds = None,
+    delay: options.Delay = None,
+    reading: options.Reading = "one-sided",
     workers: Annotated[
         int | None,
         typer.Option(

@@ -18,11 +18,11 @@ from gpi_hammerstein.cli.output import (
     print_json,
     say_written,
     working,
-    write_json,
 )
 from gpi_hammerstein.cli.simulate import ModelFile
 from gpi_hammerstein.escaping import in_cell
 from gpi_hammerstein.io import Recording, read_recording
+from gpi_hammerstein.json_values import write_json
 
 ReferenceFile = Annotated[
     Path,

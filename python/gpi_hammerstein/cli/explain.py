@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -24,15 +24,13 @@ from gpi_hammerstein.cli.output import (
     say_written,
     stoppable,
     working,
-    write_json,
 )
 from gpi_hammerstein.cli.progress import progress_bar
 from gpi_hammerstein.cli.residual import name_pictures, write_residual_pictures
 from gpi_hammerstein.explanation import in_words, to_dict
 from gpi_hammerstein.held_out import rule_of
 from gpi_hammerstein.io import Recording
-
-MODEL = "Model"
+from gpi_hammerstein.json_values import write_json
 
 
 def explain(
@@ -50,53 +48,13 @@ def explain(
         Path | None,
         typer.Option(help="Another experiment of the same actuator for the test.", metavar="FILE"),
     ] = None,
-    effects: Annotated[
-        str | None,
-        typer.Option(
-            help="Effects that may be added, separated by commas. Default: all. `none`: no effect.",
-            metavar="A,B",
-        ),
-    ] = None,
-    require: Annotated[
-        str | None,
-        typer.Option(
-            help="Effects that are added even if they are not significant, separated by commas.",
-            metavar="A,B",
-        ),
-    ] = None,
-    order: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Order of the linear part. Additional states are then an effect.",
-            rich_help_panel=MODEL,
-        ),
-    ] = None,
-    half_widths: Annotated[
-        str | None,
-        typer.Option(
-            help="Number of plays, or their half-widths.", rich_help_panel=MODEL, metavar="N|R1,R2,.."
-        ),
-    ] = None,
-    thresholds: Annotated[
-        str | None,
-        typer.Option(
-            help="Number of deadzones, or their thresholds.", rich_help_panel=MODEL, metavar="N|H1,H2,.."
-        ),
-    ] = None,
-    delay: Annotated[
-        int | None,
-        typer.Option(
-            min=0, help="Use a gain with this delay, in samples, as the linear part.", rich_help_panel=MODEL
-        ),
-    ] = None,
-    reading: Annotated[
-        Literal["one-sided", "directional"],
-        typer.Option(
-            help="Deadzone convention: a function of u alone, or of u and its direction.",
-            rich_help_panel=MODEL,
-        ),
-    ] = "one-sided",
+    effects: options.Effects = None,
+    require: options.Require = None,
+    order: options.Order = None,
+    half_widths: options.HalfWidths = None,
+    thresholds: options.Thresholds = None,
+    delay: options.Delay = None,
+    reading: options.Reading = "one-sided",
     out: options.Out = None,
     report: Annotated[
         bool, typer.Option("--report", help="Also write report.html, one page with all results, to DIR.")

@@ -1,4 +1,4 @@
-"""`gpi export`: write a model or its compensator for other programs."""
+"""`gpi export`: write a model, its compensator or its monitor for other programs."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -17,14 +17,16 @@ from gpi_hammerstein.export import (
     export_mat,
     export_model_c,
     export_model_rust,
+    export_monitor_c,
     export_rust,
 )
 
 What = Annotated[
-    Literal["model", "compensator"] | None,
+    Literal["model", "compensator", "monitor"] | None,
     typer.Option(
         help="The model with its effects, which computes the output from the input; or the compensator, "
-        "which computes the drive from a reference. Default: compensator in C and Rust, model elsewhere.",
+        "which computes the drive from a reference; or the monitor, which tests whether the machine has "
+        "changed (in C). Default: compensator in C and Rust, model elsewhere.",
         show_default=False,
     ),
 ]
@@ -73,7 +75,8 @@ PrecisionOption = Annotated[
 Name = Annotated[
     str | None,
     typer.Option(
-        help="Prefix of the names of files, types and functions in C. Default: gpi_model or gpi_compensator.",
+        help="Prefix of the names of files, types and functions in C. Default: gpi_model, gpi_compensator or "
+        "gpi_monitor.",
         show_default=False,
     ),
 ]
@@ -90,7 +93,7 @@ def export(
     precision: PrecisionOption = "single",
     name: Name = None,
 ) -> None:
-    """Write a model or its compensator for other programs, which run it sample by sample.
+    """Write a model, its compensator or its monitor for other programs, which run it sample by sample.
 
     The source code needs no heap and no library. Its comments contain the hash of the model, the units and
     the limits. A compensator compensates hysteresis and creep exactly. Of the dynamics it compensates only
@@ -102,9 +105,12 @@ def export(
             f"nothing to write: name a folder (--c {own}) or a file (--rust {own}.rs, --fmu {what or 'model'}"
             ".fmu, --mat model.mat)"
         )
+    if what == "monitor" and (c is None or rust is not None or fmu is not None or mat is not None):
+        raise ParameterError("`what` = monitor: a monitor is written in C (--c DIR), and in nothing else")
     if mat is not None and what == "compensator":
         raise ParameterError("`what` = compensator: --mat writes models only; use --c, --rust or --fmu")
-    code, elsewhere = what or "compensator", what or "model"
+    code: str = what or "compensator"
+    elsewhere: Literal["model", "compensator"] = "compensator" if what == "compensator" else "model"
     asked = {code} if rust is not None or c is not None else set()
     asked |= {elsewhere} if fmu is not None or mat is not None else set()
     if "compensator" not in asked and limits is not None:
@@ -124,6 +130,9 @@ def export(
         name = name or f"gpi_{code}"
         if code == "model":
             export_model_c(model, c, precision=precision, name=name)
+        elif code == "monitor":
+            export_monitor_c(model, c, precision=precision, name=name)
+            written += [c / f"{name}_model.h", c / f"{name}_model.c"]
         else:
             export_c(model, c, limits=limits, precision=precision, name=name)
         written += [c / f"{name}.h", c / f"{name}.c"]

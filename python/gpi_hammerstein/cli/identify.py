@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 
@@ -17,14 +17,13 @@ from gpi_hammerstein.cli.output import (
     describe_record,
     print_json,
     working,
-    write_json,
 )
 from gpi_hammerstein.cli.progress import progress_bar
 from gpi_hammerstein.held_out import rule_in_words
 from gpi_hammerstein.io import Recording, raise_warmup
+from gpi_hammerstein.json_values import write_json
 
 HOLDOUT = "Held-out data"
-MODEL = "Model"
 
 
 def identify(
@@ -55,43 +54,24 @@ def identify(
         ),
     ] = None,
     taps: Annotated[
-        int | None, typer.Option(min=1, help="Number of FIR taps.", rich_help_panel=MODEL)
+        int | None, typer.Option(min=1, help="Number of FIR taps.", rich_help_panel=options.MODEL)
     ] = None,
     order: Annotated[
         int | None,
-        typer.Option(min=0, help="Order (number of states) of the linear part.", rich_help_panel=MODEL),
-    ] = None,
-    half_widths: Annotated[
-        str | None,
         typer.Option(
-            help="Number of plays, or their half-widths.", rich_help_panel=MODEL, metavar="N|R1,R2,.."
+            min=0, help="Order (number of states) of the linear part.", rich_help_panel=options.MODEL
         ),
     ] = None,
-    thresholds: Annotated[
-        str | None,
-        typer.Option(
-            help="Number of deadzones, or their thresholds.", rich_help_panel=MODEL, metavar="N|H1,H2,.."
-        ),
-    ] = None,
-    delay: Annotated[
-        int | None,
-        typer.Option(
-            min=0, help="Use a gain with this delay, in samples, as the linear part.", rich_help_panel=MODEL
-        ),
-    ] = None,
-    reading: Annotated[
-        Literal["one-sided", "directional"],
-        typer.Option(
-            help="Deadzone convention: a function of u alone, or of u and its direction.",
-            rich_help_panel=MODEL,
-        ),
-    ] = "one-sided",
+    half_widths: options.HalfWidths = None,
+    thresholds: options.Thresholds = None,
+    delay: options.Delay = None,
+    reading: options.Reading = "one-sided",
     offset_knots: Annotated[
         int,
         typer.Option(
             min=1,
             help="Knots of the offset of each experiment. With 2 or more, the offset may drift.",
-            rich_help_panel=MODEL,
+            rich_help_panel=options.MODEL,
         ),
     ] = 1,
     robust: Annotated[
@@ -99,7 +79,7 @@ def identify(
         typer.Option(
             "--robust/--no-robust",
             help="Give outliers less weight. Default: chosen from the data.",
-            rich_help_panel=MODEL,
+            rich_help_panel=options.MODEL,
             show_default=False,
         ),
     ] = None,

@@ -1,7 +1,7 @@
 """Options that several commands share, and the functions that parse them."""
 
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import typer
 
@@ -12,6 +12,7 @@ from gpi_hammerstein.io import Recording
 from gpi_hammerstein.io.for_model import read_for_model
 
 COLUMNS = "Columns"
+MODEL = "Model"
 
 
 class Pair(NamedTuple):
@@ -130,6 +131,46 @@ FitStart = Annotated[
         "--fit-start/--no-fit-start",
         help="Fit the unknown initial state (plays, dynamics) of the tested record, or simulate it from the "
         "steady state at its first input.",
+    ),
+]
+Effects = Annotated[
+    str | None,
+    typer.Option(
+        help="Effects that may be added, separated by commas. Default: all. `none`: no effect.", metavar="A,B"
+    ),
+]
+Require = Annotated[
+    str | None,
+    typer.Option(
+        help="Effects that are added even if they are not significant, separated by commas.", metavar="A,B"
+    ),
+]
+Order = Annotated[
+    int | None,
+    typer.Option(
+        min=1, help="Order of the linear part. Additional states are then an effect.", rich_help_panel=MODEL
+    ),
+]
+HalfWidths = Annotated[
+    str | None,
+    typer.Option(help="Number of plays, or their half-widths.", rich_help_panel=MODEL, metavar="N|R1,R2,.."),
+]
+Thresholds = Annotated[
+    str | None,
+    typer.Option(
+        help="Number of deadzones, or their thresholds.", rich_help_panel=MODEL, metavar="N|H1,H2,.."
+    ),
+]
+Delay = Annotated[
+    int | None,
+    typer.Option(
+        min=0, help="Use a gain with this delay, in samples, as the linear part.", rich_help_panel=MODEL
+    ),
+]
+Reading = Annotated[
+    Literal["one-sided", "directional"],
+    typer.Option(
+        help="Deadzone convention: a function of u alone, or of u and its direction.", rich_help_panel=MODEL
     ),
 ]
 Out = Annotated[

@@ -45,11 +45,6 @@ def print_json(result: Mapping[str, Any]) -> None:
     print(json.dumps(plain(result), allow_nan=False))
 
 
-def write_json(result: Mapping[str, Any], path: Path) -> None:
-    """Write one JSON object to a file, in an indented form."""
-    path.write_text(json.dumps(plain(result), allow_nan=False, indent=2) + "\n")
-
-
 def console() -> Console:
     """Return the console for summaries."""
     screen = Console(highlight=False, soft_wrap=True)

@@ -18,13 +18,13 @@ from gpi_hammerstein.cli.output import (
     print_json,
     say_written,
     working,
-    write_json,
 )
 from gpi_hammerstein.cli.residual import name_pictures, tests_table, write_residual_pictures
 from gpi_hammerstein.cli.simulate import ModelFile, Skip
 from gpi_hammerstein.driven import require_match
 from gpi_hammerstein.explanation import failed_in_words
 from gpi_hammerstein.held_out import rule_in_words
+from gpi_hammerstein.json_values import write_json
 
 OwnRecord = Annotated[
     bool,

@@ -10,7 +10,8 @@ from rich.table import Table
 
 from gpi_hammerstein import files
 from gpi_hammerstein.cli import options
-from gpi_hammerstein.cli.output import console, picture, print_json, say_written, working, write_json
+from gpi_hammerstein.cli.output import console, picture, print_json, say_written, working
+from gpi_hammerstein.json_values import write_json
 from gpi_hammerstein.reproduce.paper import PERIOD, Paper, ReadingResult, paper, response
 
 if TYPE_CHECKING:

@@ -17,10 +17,10 @@ from gpi_hammerstein.cli.output import (
     picture,
     print_json,
     say_written,
-    write_json,
 )
 from gpi_hammerstein.cli.progress import progress_bar
 from gpi_hammerstein.explanation import in_words, to_dict
+from gpi_hammerstein.json_values import write_json
 from gpi_hammerstein.reproduce.steering_mirror import (
     HELD_OUT,
     LEVELS,
