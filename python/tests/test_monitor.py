@@ -161,6 +161,9 @@ def test_wrong_calls(model):
         monitor.push([0.0, 0.0, 0.0, np.inf], np.zeros(4))
     with pytest.raises(gpi.DataError):
         monitor.push(np.zeros(4), np.zeros(5))
+    monitor.push(np.zeros(4), np.zeros(4))
+    with pytest.raises(gpi.DataError, match="covariates"):
+        monitor.push(np.zeros(4), np.zeros(4), np.zeros(3))
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@
 //! ```
 //!
 //! with the noise w of the training record, an error m that is known to be possible, and the changes d_i: of the offset, the
-//! gain, the first resonance, and the width of the hysteresis, whose `phi_i = dy_hat / dd_i` are simulated along ([`moved`]).
+//! gain, the first resonance, and the width of the hysteresis, whose `phi_i = dy_hat / dd_i` are simulated along (`moved`).
 //! [`crate::operators::ResidualMonitor`] decides which changes two successive windows agree upon, for windows of all
-//! lengths; [`lines`] searches for sines. What is known to be possible is the misfit of the training record, the
+//! lengths; `lines` searches for sines. What is known to be possible is the misfit of the training record, the
 //! uncertainty of the parameters, effects of time such as drift, and the unknown start, whose share ends when the
 //! drive has swept its range.
 //!
@@ -245,6 +245,7 @@ impl Monitor {
         Error::require_equal("outputs", ("output", output.ncols()), channels)?;
         let samples = ("input", input.nrows());
         Error::require_equal("samples", ("output", output.nrows()), samples)?;
+        Error::require_equal("samples", ("covariates", covariates.nrows()), samples)?;
         if let Some(place) = input.iter().position(|value| !value.is_finite()) {
             let row = place % input.nrows();
             return Err(Error::parameter(
