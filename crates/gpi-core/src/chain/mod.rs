@@ -66,7 +66,6 @@ mod loops;
 mod memories;
 mod model;
 mod motion;
-mod movement;
 mod names;
 mod numbers;
 mod placement;
