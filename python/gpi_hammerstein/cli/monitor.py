@@ -134,14 +134,14 @@ def _of_files(
     model: Model, records: Sequence[Path], follow: bool, read: dict[str, Any]
 ) -> Iterator[tuple[bool, Run]]:
     if not follow:
-        for _, run in streams.of_files(model, streams.record_files(records), **read):
+        for run in streams.of_files(model, streams.record_files(records), **read):
             yield True, run
         return
     if len(records) != 1 or not records[0].is_dir():
         raise ParameterError("`follow`: give one folder, whose new files are read")
     for file in streams.followed(records[0], _complain):
         try:
-            yield from ((True, run) for _, run in streams.of_files(model, [file], **read))
+            yield from ((True, run) for run in streams.of_files(model, [file], **read))
         except DataError as error:
             # the next file may be right
             _complain(str(error))

@@ -1,9 +1,11 @@
 """The result of the comparison of two populations of stages."""
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from gpi_hammerstein.difference.significance import LEVEL
+from gpi_hammerstein.difference.words import conclusion, shown, verdict
 from gpi_hammerstein.json_values import plain
 
 
@@ -148,6 +150,58 @@ class FleetDifferences:
 
     def __repr__(self) -> str:
         """Return tables of the figures and the effects, and what follows from them."""
-        from gpi_hammerstein.difference.words import fleets_in_words
-
         return "\n".join(fleets_in_words(self))
+
+
+def fleets_in_words(found: FleetDifferences) -> Iterator[str]:
+    """Yield the lines of the comparison of two populations.
+
+    Parameters
+    ----------
+    found
+        The comparison.
+
+    Yields
+    ------
+    str
+        Tables, then sentences.
+    """
+    each = zip("AB", found.names, found.devices, found.records, found.failed, strict=True)
+    for label, name, devices, records, failed in each:
+        of_file = "" if name == label else f" ({name})"
+        yield f"{label}{of_file}: {devices} devices, {records} records, {failed} of them without a result"
+    labels = [f"{row.name} [{row.unit}]" if row.unit else row.name for row in found.figures]
+    width = max([24, *map(len, labels)])
+    yield ""
+    heads = f"{'median A':>12}{'spread':>10}{'median B':>12}{'spread':>10}{'B - A':>12}{'p':>10}"
+    yield f"{'Figures':<{width}}{'number':>12}{heads}"
+    yield "-" * (width + 92)
+    for label, row in zip(labels, found.figures, strict=True):
+        counts = f"{row.count_a}" if row.count_a == row.count_b else f"{row.count_a}, {row.count_b}"
+        cells = [
+            shown(row.median_a, 12, 5),
+            shown(row.spread_a, 10, 2),
+            shown(row.median_b, 12, 5),
+            shown(row.spread_b, 10, 2),
+            shown(row.difference, 12, 3),
+            shown(row.p_value, 10, 2),
+        ]
+        yield f"{label:<{width}}{counts:>12}{''.join(cells)}  {verdict(row.differs)}"
+    if found.effects:
+        yield ""
+        yield f"{'Devices with the effect':<{width}}{'A':>12}{'B':>12}{'p':>10}"
+        yield "-" * (width + 48)
+        for one in found.effects:
+            counts = f"{one.count_a} of {one.total_a}"
+            others = f"{one.count_b} of {one.total_b}"
+            line = f"{one.effect:<{width}}{counts:>12}{others:>12}{shown(one.p_value, 10, 2)}"
+            yield f"{line}  {verdict(one.differs)}"
+    yield ""
+    every = [*(row.differs for row in found.figures), *(row.differs for row in found.effects)]
+    yield conclusion(found.differing, sum(own is not None for own in every), "figures and effects")
+    yield (
+        "All devices were compared by the rank-sum test of Mann and Whitney."
+        if found.pairs is None
+        else f"{found.pairs} devices are in both tables: they were compared by Wilcoxon's signed-rank test."
+    )
+    yield "The spread is a robust standard deviation: 1.4826 times the median absolute deviation."

@@ -22,7 +22,7 @@ PERIOD = 1.0
 HEAD = 20
 
 
-def of_files(model: Model, files: Iterable[Path], **options: Any) -> Iterator[tuple[str, Run]]:
+def of_files(model: Model, files: Iterable[Path], **options: Any) -> Iterator[Run]:
     """Yield the experiments of record files.
 
     Parameters
@@ -36,8 +36,8 @@ def of_files(model: Model, files: Iterable[Path], **options: Any) -> Iterator[tu
 
     Yields
     ------
-    tuple of str and Run
-        The name of the file, and one of its experiments.
+    Run
+        One experiment after the other.
 
     Raises
     ------
@@ -46,14 +46,13 @@ def of_files(model: Model, files: Iterable[Path], **options: Any) -> Iterator[tu
 
     Examples
     --------
-    >>> for name, run in of_files(model, [Path("today.csv")]):  # doctest: +SKIP
+    >>> for run in of_files(model, [Path("today.csv")]):  # doctest: +SKIP
     ...     monitor.push(run.u, run.y)
     """
     for file in files:
         recording = read_for_model(model, [file], **options)
         require_monitored(model, recording)
-        for run in recording.runs:
-            yield str(file), run
+        yield from recording.runs
 
 
 def require_monitored(model: Model, recording: Recording) -> None:
@@ -140,12 +139,9 @@ def followed(folder: Path, refused: Callable[[str], None]) -> Iterator[Path]:
 def _records_of(folder: Path) -> list[Path]:
     """Return the record files of a folder, the oldest first."""
     inside = [
-        file for file in folder.iterdir() if file.is_file() and file.name.lower().endswith(FORMATS_ENDINGS)
+        file for file in folder.iterdir() if file.is_file() and file.name.lower().endswith(tuple(FORMATS))
     ]
     return sorted(inside, key=lambda file: (file.stat().st_mtime, file.name))
-
-
-FORMATS_ENDINGS = tuple(FORMATS)
 
 
 def of_lines(
