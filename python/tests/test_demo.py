@@ -52,6 +52,15 @@ def test_the_demonstration_names_what_was_put_in(shown: Demonstration) -> None:
     assert result["left"]["lag1"] > 0.5
 
 
+def test_where_the_input_hardly_is_the_model_stays_plausible() -> None:
+    """Only the half that is not scored reaches the largest inputs, for nine samples."""
+    record = gpi.read_record(DATA / "demo.csv.gz")
+    model = gpi.identify(record.split(0.5)[1])
+    slopes = np.cumsum(model.hysteresis[0].envelope.weights)
+    assert np.all(np.abs(slopes) < 10)
+    assert model.error(record)["nrmse"] < 0.03
+
+
 def test_the_demonstration_writes_model_json_and_pictures(shown: Demonstration) -> None:
     folder, _, result = shown
     assert sorted(file.name for file in folder.iterdir()) == result["files"]

@@ -143,3 +143,13 @@ def test_what_one_sine_teaches_holds_for_other_amplitudes(one_sine: gpi.Explanat
     # the mean counts too: the start is fitted behind a warm-up, which a play as wide as the stroke outlasts
     error = one_sine.model.error(other, fit_start=True)
     assert error["rms"] < 0.004 * FULL_SPAN
+
+
+def test_the_level_is_right_without_a_fitted_start(one_sine: gpi.Explanation) -> None:
+    """A play that hardly moves in the record would move the level, if its weight could be of any size."""
+    path = MEASURED / "piezo-p885-dbo" / "test_1hz_varying_amplitude.csv"
+    other = gpi.read_record(path, covariate=[])
+    found = one_sine.model.on_another_record(other, fit_start=False)
+    assert found["error"]["nrmse"] < 0.06
+    plays = one_sine.model.hysteresis[0].plays
+    assert plays.weights.max() < 5 * 12.6, "um/V, the slope of the stage"

@@ -5,18 +5,24 @@
 //!
 //! | group | limits of theta + s |
 //! |---|---|
-//! | weight of a play | at least 0 |
-//! | threshold | same side of zero; [`INSIDE`] of the range away from zero and from low and high; [`REACH`] of the gap to a neighbour |
+//! | weight of a play | at least 0; at most [`STEEPEST`] times the mean slope of the output over z, less for a play that slides over less than [`SLIDES`] of the movement |
+//! | slope behind a threshold | held where less than [`SHOWN`] of the path of u lies behind the threshold |
+//! | threshold | same side of zero; [`INSIDE`] of the range away from zero and from low and high; [`SHOWN`] of the path of u behind it; [`REACH`] of the gap to a neighbour |
 //! | half-width | [`REACH`] of the gap to a neighbour, on both sides; the widest: of the gap below |
 //! | start of a play | -1 to 1 |
 //! | values of an effect, a_1 of its first-order sections | those that the effect gives |
 //! | everything else | free |
+//!
+//! The bounds on weights and slopes stand for what is known of any actuator. A play that hardly moves in the record, or a
+//! segment of the envelope in which u hardly is, may otherwise get a slope of any size: it imitates a drift or an outlier
+//! there, and the model is far off on the next record.
 //!
 //! Scales that the output does not determine are held. v does not change if slopes and half-widths are multiplied by a
 //! factor and the weights are divided by it. The slope of the identity fixes that factor; where it is free, the
 //! half-width of the widest play that has a weight does. The row of C of the reference output fixes the scale of a
 //! section's states; the half-width zero and the threshold zero are the linear terms and never move.
 
+use super::movement::{extremes, scored, visited};
 use super::point::{Freedom, Point};
 use super::table::{Group, Table};
 use crate::Record;
@@ -34,6 +40,14 @@ const FREE: Limits = (f64::NEG_INFINITY, f64::INFINITY);
 const REACH: f64 = 0.4;
 /// Fraction of the input's range that a threshold keeps from its ends, so that samples lie on both sides of it.
 const INSIDE: f64 = 0.01;
+/// Part of the path of the input that must lie behind a threshold: of some thousand samples, a few.
+const SHOWN: f64 = 1e-3;
+/// Largest weight of a play over the mean slope, the movement of the output over that of z. It is reached by an actuator
+/// that consists of this play alone, if its gap takes 80 % of the movement of z.
+const STEEPEST: f64 = 5.0;
+/// Part of the movement of z over which a play must slide for this largest weight; below, the largest weight falls to the
+/// mean slope for a play that does not slide. By hand: what slides over less is seen at the ends of the movement only.
+const SLIDES: f64 = 0.05;
 
 impl Point {
     /// The bounds of a step: weights stay positive, plays stay at z plus or minus their half-width, thresholds on
@@ -58,12 +72,26 @@ impl Point {
             {
                 vec![HELD; values.len()]
             }
-            Group::Weights { .. } => values.iter().map(|weight| (-weight, f64::INFINITY)).collect(),
+            Group::Weights { input } => {
+                let (most, moved) = self.steepest(record, input);
+                let widths = &self.channels[input].half_widths;
+                let slides = |r: f64| ((1.0 - 2.0 * r / moved) / SLIDES).clamp(0.0, 1.0);
+                let most_of = |r: f64| most * (slides(r) + (1.0 - slides(r)) / STEEPEST);
+                let pairs = values.iter().zip(widths);
+                pairs.map(|(weight, &r)| (-weight, most_of(r) - weight)).collect()
+            }
             Group::Slopes { input } => {
                 let is_held = !freedom.identity || self.widest_used(input) == 0;
-                (0..values.len()).map(|place| held(place == 0 && is_held)).collect()
+                let (low, high) = visited(record, input, SHOWN);
+                let etas = &self.channels[input].thresholds;
+                let is_rare = |eta: f64| eta > 0.0 && eta >= high || eta < 0.0 && eta <= low;
+                let is_held =
+                    |place: usize| if place == 0 { is_held } else { is_rare(etas[place]) };
+                (0..values.len()).map(|place| held(is_held(place))).collect()
             }
-            Group::Thresholds { input } => thresholds(&values, range(record, input)),
+            Group::Thresholds { input } => {
+                thresholds(&values, range(record, input), visited(record, input, SHOWN))
+            }
             Group::HalfWidths { input } => {
                 // the widest play that moves sets the scale of z, where the identity does not
                 let widest = if freedom.identity { self.widest_used(input) } else { values.len() };
@@ -122,6 +150,19 @@ impl Point {
         spacings
     }
 
+    /// The largest weight of a play that slides, where the DC gain of the dynamics is held and the output moves, else infinity;
+    /// and the movement of z.
+    fn steepest(&self, record: &Record, input: usize) -> (f64, f64) {
+        let (output, gain) = self.dynamics.held[input];
+        let span = |(low, high): (f64, f64)| high - low;
+        let moved = span(extremes(scored(record, |e| &e.output, output).flatten()));
+        let u = scored(record, |e| &e.input, input).flatten();
+        let z = span(self.channels[input].envelope_range(u));
+        let slope = moved / (z * gain.abs());
+        let is_known = slope.is_finite() && slope > 0.0;
+        if is_known { (STEEPEST * slope, z) } else { (f64::INFINITY, f64::INFINITY) }
+    }
+
     /// The place of the widest play with a weight.
     fn widest_used(&self, input: usize) -> usize {
         self.channels[input].weights.iter().rposition(|&weight| weight > 0.0).unwrap_or(0)
@@ -130,8 +171,9 @@ impl Point {
 
 /// The first threshold, zero, is held. The nearest that the others may come to: zero, the ends of the range, their
 /// neighbours.
-fn thresholds(etas: &[f64], (low, high): (f64, f64)) -> Vec<Limits> {
+fn thresholds(etas: &[f64], (low, high): (f64, f64), (least, most): (f64, f64)) -> Vec<Limits> {
     let inside = INSIDE * (high - low);
+    let (low, high) = (low.max(least - inside), high.min(most + inside));
     let limits = |(place, &eta): (usize, &f64)| {
         if place == 0 {
             return HELD;
@@ -169,4 +211,70 @@ pub(crate) fn range(record: &Record, input: usize) -> (f64, f64) {
     columns.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), column| {
         (low.min(column.min()), high.max(column.max()))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::hysteresis::Parameters;
+    use crate::chain::point::{DynamicsFreedom, Past};
+    use crate::chain::sensitivity::Derivatives;
+    use crate::linear::Sections;
+    use crate::operators::Reading;
+    use crate::{Channel, Experiment, Matrix};
+    use nalgebra::DVector;
+
+    /// A drive between -1 and 1 with one visit of 1.5, and an output of twice its size.
+    fn record() -> Record {
+        let visit = |k: usize| if k == 700 { 1.5 } else { (0.05 * k as f64).sin() };
+        let u = Matrix::from_fn(200_000, 1, |k, _| visit(k));
+        let channel = |name| vec![Channel::new(name, "")];
+        let run = vec![Experiment::new(u.clone(), 2.0 * u)];
+        Record::new(run, 1.0, channel("u"), channel("y"), vec![]).unwrap()
+    }
+
+    fn limits(point: &Point, group: Group) -> Vec<Limits> {
+        let freedom = Freedom {
+            weights: true,
+            derivatives: Derivatives::default(),
+            states: false,
+            identity: false,
+            dynamics: DynamicsFreedom::Nothing,
+        };
+        point.limits(group, &record(), freedom)
+    }
+
+    fn point(thresholds: Vec<f64>, half_widths: Vec<f64>) -> Point {
+        let channel = Parameters::identity(Reading::OneSided, thresholds, half_widths);
+        Point {
+            pasts: vec![Past { plays: None, has_unknown_state: false, state: DVector::zeros(0) }],
+            channels: vec![channel],
+            dynamics: Sections::delayed_gain(&Matrix::from_element(1, 1, 1.0), 0),
+            effects: Vec::new(),
+            rate: 1.0,
+            offsets: vec![Matrix::zeros(1, 1)],
+        }
+    }
+
+    #[test]
+    fn a_slope_where_the_input_hardly_is_does_not_move() {
+        let point = point(vec![0.5, 1.2], vec![0.0]);
+        assert_eq!(limits(&point, Group::Slopes { input: 0 }), [HELD, FREE, HELD]);
+        let thresholds = limits(&point, Group::Thresholds { input: 0 });
+        // a threshold beyond moves back only, and none comes there
+        assert!(thresholds[2].1 <= 0.0 && 0.5 + thresholds[1].1 < 1.0, "{thresholds:?}");
+    }
+
+    #[test]
+    fn no_play_is_much_steeper_than_the_stage() {
+        // z moves by 2.5, the output by 5: a mean slope of 2
+        let point = point(vec![], vec![0.0, 0.5, 1.2, 1.25, 1.3]);
+        let limits = limits(&point, Group::Weights { input: 0 });
+        let most: Vec<f64> =
+            limits.iter().zip(&point.channels[0].weights).map(|((_, high), w)| w + high).collect();
+        let expected = [10.0, 10.0, 2.0 + 8.0 * 0.1 / (2.5 * 0.05), 2.0, 2.0];
+        for (found, expected) in most.iter().zip(expected) {
+            assert!((found - expected).abs() < 0.01, "{most:?}");
+        }
+    }
 }

@@ -66,6 +66,7 @@ mod loops;
 mod memories;
 mod model;
 mod motion;
+mod movement;
 mod names;
 mod numbers;
 mod placement;
