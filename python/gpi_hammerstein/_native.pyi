@@ -38,6 +38,7 @@ __all__ = [
     "Model",
     "Compensation",
     "Compensator",
+    "Monitor",
     "Identification",
     "Refinement",
     "Explanation",

@@ -5,8 +5,8 @@
 //!
 //! | group | limits of theta + s |
 //! |---|---|
-//! | weight of a play | at least 0; at most [`STEEPEST`] times the mean slope of the output over z, less for a play that slides over less than [`SLIDES`] of the movement |
-//! | slope behind a threshold | held where less than [`SHOWN`] of the path of u lies behind the threshold |
+//! | weight of a play | at least 0; at most [`STEEPEST`] times the mean slope of the output over z, less for a play that slides over less than [`RARE`] of the movement |
+//! | slope behind a threshold | up or down at most [`STEEPEST`] times the mean slope of z over u where less than [`RARE`] of the path of u lies behind the threshold, less where it is less |
 //! | threshold | same side of zero; [`INSIDE`] of the range away from zero and from low and high; [`SHOWN`] of the path of u behind it; [`REACH`] of the gap to a neighbour |
 //! | half-width | [`REACH`] of the gap to a neighbour, on both sides; the widest: of the gap below |
 //! | start of a play | -1 to 1 |
@@ -22,7 +22,7 @@
 //! half-width of the widest play that has a weight does. The row of C of the reference output fixes the scale of a
 //! section's states; the half-width zero and the threshold zero are the linear terms and never move.
 
-use super::movement::{extremes, scored, visited};
+use super::movement::{Path, extremes, scored};
 use super::point::{Freedom, Point};
 use super::table::{Group, Table};
 use crate::Record;
@@ -45,9 +45,16 @@ const SHOWN: f64 = 1e-3;
 /// Largest weight of a play over the mean slope, the movement of the output over that of z. It is reached by an actuator
 /// that consists of this play alone, if its gap takes 80 % of the movement of z.
 const STEEPEST: f64 = 5.0;
-/// Part of the movement of z over which a play must slide for this largest weight; below, the largest weight falls to the
-/// mean slope for a play that does not slide. By hand: what slides over less is seen at the ends of the movement only.
-const SLIDES: f64 = 0.05;
+/// Part of the path of u behind a threshold, or of the movement of z over which a play slides, from which a slope may be
+/// steep. By hand: less is seen at the ends of the movement only.
+const RARE: f64 = 0.05;
+
+/// The largest slope over the mean slope of a part of the hysteresis: 1 where the record does not show it, [`STEEPEST`]
+/// where it is shown `shown >= 1` times as well as needed.
+fn steepness(shown: f64) -> f64 {
+    let shown = if shown > 0.0 { shown.min(1.0) } else { 0.0 };
+    1.0 + (STEEPEST - 1.0) * shown
+}
 
 impl Point {
     /// The bounds of a step: weights stay positive, plays stay at z plus or minus their half-width, thresholds on
@@ -73,24 +80,30 @@ impl Point {
                 vec![HELD; values.len()]
             }
             Group::Weights { input } => {
-                let (most, moved) = self.steepest(record, input);
-                let widths = &self.channels[input].half_widths;
-                let slides = |r: f64| ((1.0 - 2.0 * r / moved) / SLIDES).clamp(0.0, 1.0);
-                let most_of = |r: f64| most * (slides(r) + (1.0 - slides(r)) / STEEPEST);
-                let pairs = values.iter().zip(widths);
-                pairs.map(|(weight, &r)| (-weight, most_of(r) - weight)).collect()
+                let mean = self.mean_slope(record, input);
+                let moved = self.envelope_span(record, input);
+                let most = |r: f64| mean * steepness((1.0 - 2.0 * r / moved) / RARE);
+                let pairs = values.iter().zip(&self.channels[input].half_widths);
+                pairs.map(|(weight, &r)| (-weight, most(r) - weight)).collect()
             }
             Group::Slopes { input } => {
                 let is_held = !freedom.identity || self.widest_used(input) == 0;
-                let (low, high) = visited(record, input, SHOWN);
+                let path = Path::of(record, input);
+                let mean = self.envelope_span(record, input) / path.span();
                 let etas = &self.channels[input].thresholds;
-                let is_rare = |eta: f64| eta > 0.0 && eta >= high || eta < 0.0 && eta <= low;
-                let is_held =
-                    |place: usize| if place == 0 { is_held } else { is_rare(etas[place]) };
-                (0..values.len()).map(|place| held(is_held(place))).collect()
+                let limits = |(place, &slope): (usize, &f64)| match path.behind(etas[place]) {
+                    _ if place == 0 => held(is_held),
+                    part if part < RARE => {
+                        let most = mean * steepness(part / RARE);
+                        (-most - slope, most - slope)
+                    }
+                    _ => FREE,
+                };
+                values.iter().enumerate().map(limits).collect()
             }
             Group::Thresholds { input } => {
-                thresholds(&values, range(record, input), visited(record, input, SHOWN))
+                let visited = Path::of(record, input).visited(SHOWN);
+                thresholds(&values, range(record, input), visited)
             }
             Group::HalfWidths { input } => {
                 // the widest play that moves sets the scale of z, where the identity does not
@@ -150,17 +163,19 @@ impl Point {
         spacings
     }
 
-    /// The largest weight of a play that slides, where the DC gain of the dynamics is held and the output moves, else infinity;
-    /// and the movement of z.
-    fn steepest(&self, record: &Record, input: usize) -> (f64, f64) {
+    /// The movement of the output over that of z and the DC gain of the dynamics; infinite where one of them is zero.
+    fn mean_slope(&self, record: &Record, input: usize) -> f64 {
         let (output, gain) = self.dynamics.held[input];
-        let span = |(low, high): (f64, f64)| high - low;
-        let moved = span(extremes(scored(record, |e| &e.output, output).flatten()));
+        let (low, high) = extremes(scored(record, |e| &e.output, output).flatten());
+        let slope = (high - low) / (self.envelope_span(record, input) * gain.abs());
+        if slope.is_finite() && slope > 0.0 { slope } else { f64::INFINITY }
+    }
+
+    /// Largest minus smallest z.
+    fn envelope_span(&self, record: &Record, input: usize) -> f64 {
         let u = scored(record, |e| &e.input, input).flatten();
-        let z = span(self.channels[input].envelope_range(u));
-        let slope = moved / (z * gain.abs());
-        let is_known = slope.is_finite() && slope > 0.0;
-        if is_known { (STEEPEST * slope, z) } else { (f64::INFINITY, f64::INFINITY) }
+        let (low, high) = self.channels[input].envelope_range(u);
+        high - low
     }
 
     /// The place of the widest play with a weight.
@@ -257,9 +272,12 @@ mod tests {
     }
 
     #[test]
-    fn a_slope_where_the_input_hardly_is_does_not_move() {
+    fn a_slope_where_the_input_hardly_is_stays_small() {
         let point = point(vec![0.5, 1.2], vec![0.0]);
-        assert_eq!(limits(&point, Group::Slopes { input: 0 }), [HELD, FREE, HELD]);
+        let slopes = limits(&point, Group::Slopes { input: 0 });
+        assert_eq!(slopes[..2], [HELD, FREE]);
+        let (down, up) = slopes[2];
+        assert!(down == -up && (1.0..1.05).contains(&up), "{slopes:?}");
         let thresholds = limits(&point, Group::Thresholds { input: 0 });
         // a threshold beyond moves back only, and none comes there
         assert!(thresholds[2].1 <= 0.0 && 0.5 + thresholds[1].1 < 1.0, "{thresholds:?}");
