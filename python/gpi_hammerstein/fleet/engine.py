@@ -10,8 +10,9 @@ import os
 import signal
 from collections import deque
 from collections.abc import Generator, Iterable
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from dataclasses import dataclass
+from queue import SimpleQueue
 from typing import Any
 
 from gpi_hammerstein._native import ParameterError
@@ -22,8 +23,9 @@ from gpi_hammerstein.fleet.work import Task, work
 AHEAD = 2
 # How often a record is tried alone, until it is given up.
 ATTEMPTS = 2
-# Tasks in an executor that somebody else made, whose number of workers is not known.
-WINDOW = 1000
+# Tasks in an executor that somebody else made, whose number of workers is not known: enough for some thousands. What
+# waits in a scheduler costs it memory, some kilobytes for each task.
+WINDOW = 10_000
 GIB = 1 << 30
 
 Row = dict[str, Any]
@@ -153,24 +155,26 @@ def _require_start(pool: Executor) -> None:
 def _until_broken(waiting: deque[Task], pool: Executor, most: int) -> Generator[Done, None, list[Task]]:
     """Yield tasks and rows; return the tasks that were in work when the pool broke."""
     running: dict[Future[Row], Task] = {}
+    finished: SimpleQueue[Future[Row]] = SimpleQueue()
     lost: list[Task] = []
     while (waiting and not lost) or running:
         try:
             while waiting and not lost and len(running) < most:
-                running[pool.submit(work, waiting[0])] = waiting[0]
-                waiting.popleft()
+                future = pool.submit(work, waiting[0])
+                running[future] = waiting.popleft()
+                # a call of `wait` would look at every running task for each one that ends
+                future.add_done_callback(finished.put)
         except BrokenExecutor:
             lost.extend(running.values())
             return lost or [waiting.popleft()]
-        finished, _ = wait(running, return_when=FIRST_COMPLETED)
-        for future in finished:
-            task = running.pop(future)
-            try:
-                yield task, future.result()
-            except BrokenExecutor:
-                lost.append(task)
-            except Exception as error:  # noqa: BLE001  one record must not end the batch
-                yield task, _failed(task, f"{type(error).__name__}: {error}")
+        future = finished.get()
+        task = running.pop(future)
+        try:
+            yield task, future.result()
+        except BrokenExecutor:
+            lost.append(task)
+        except Exception as error:  # noqa: BLE001  one record must not end the batch
+            yield task, _failed(task, f"{type(error).__name__}: {error}")
     return lost
 
 

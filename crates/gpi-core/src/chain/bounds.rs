@@ -5,7 +5,7 @@
 //!
 //! | group | limits of theta + s |
 //! |---|---|
-//! | weight of a play | at least 0; at most [`STEEPEST`] times the mean slope of the output over z, less for a play that slides over less than [`RARE`] of the movement |
+//! | weight of a play | at least 0; at most [`STEEPEST`] times the mean slope of v over z, less for a play that slides over less than [`RARE`] of the movement |
 //! | slope behind a threshold | up or down at most [`STEEPEST`] times the mean slope of z over u where less than [`RARE`] of the path of u lies behind the threshold, less where it is less |
 //! | threshold | same side of zero; [`INSIDE`] of the range away from zero and from low and high; [`SHOWN`] of the path of u behind it; [`REACH`] of the gap to a neighbour |
 //! | half-width | [`REACH`] of the gap to a neighbour, on both sides; the widest: of the gap below |
@@ -22,7 +22,7 @@
 //! half-width of the widest play that has a weight does. The row of C of the reference output fixes the scale of a
 //! section's states; the half-width zero and the threshold zero are the linear terms and never move.
 
-use super::movement::{Path, extremes, scored};
+use super::movement::{Path, scored};
 use super::point::{Freedom, Point};
 use super::table::{Group, Table};
 use crate::Record;
@@ -42,8 +42,8 @@ const REACH: f64 = 0.4;
 const INSIDE: f64 = 0.01;
 /// Part of the path of the input that must lie behind a threshold: of some thousand samples, a few.
 const SHOWN: f64 = 1e-3;
-/// Largest weight of a play over the mean slope, the movement of the output over that of z. It is reached by an actuator
-/// that consists of this play alone, if its gap takes 80 % of the movement of z.
+/// Largest weight of a play over the mean slope of v over z, `sum_i w_i (1 - 2 r_i / Z)` where z moves by Z. It is reached by an
+/// actuator that consists of this play alone, if its gap takes 80 % of the movement of z.
 const STEEPEST: f64 = 5.0;
 /// Part of the path of u behind a threshold, or of the movement of z over which a play slides, from which a slope may be
 /// steep. By hand: less is seen at the ends of the movement only.
@@ -80,10 +80,14 @@ impl Point {
                 vec![HELD; values.len()]
             }
             Group::Weights { input } => {
-                let mean = self.mean_slope(record, input);
                 let moved = self.envelope_span(record, input);
-                let most = |r: f64| mean * steepness((1.0 - 2.0 * r / moved) / RARE);
-                let pairs = values.iter().zip(&self.channels[input].half_widths);
+                let widths = &self.channels[input].half_widths;
+                let slides = |r: f64| 1.0 - 2.0 * r / moved;
+                let v: f64 = values.iter().zip(widths).map(|(w, &r)| w * slides(r).max(0.0)).sum();
+                // nothing is known of plays without any weight
+                let mean = if v > 0.0 { v } else { f64::INFINITY };
+                let most = |r: f64| mean * steepness(slides(r) / RARE);
+                let pairs = values.iter().zip(widths);
                 pairs.map(|(weight, &r)| (-weight, most(r) - weight)).collect()
             }
             Group::Slopes { input } => {
@@ -161,14 +165,6 @@ impl Point {
             }
         }
         spacings
-    }
-
-    /// The movement of the output over that of z and the DC gain of the dynamics; infinite where one of them is zero.
-    fn mean_slope(&self, record: &Record, input: usize) -> f64 {
-        let (output, gain) = self.dynamics.held[input];
-        let (low, high) = extremes(scored(record, |e| &e.output, output).flatten());
-        let slope = (high - low) / (self.envelope_span(record, input) * gain.abs());
-        if slope.is_finite() && slope > 0.0 { slope } else { f64::INFINITY }
     }
 
     /// Largest minus smallest z.
@@ -285,12 +281,12 @@ mod tests {
 
     #[test]
     fn no_play_is_much_steeper_than_the_stage() {
-        // z moves by 2.5, the output by 5: a mean slope of 2
+        // z moves by 2.5, and so does v
         let point = point(vec![], vec![0.0, 0.5, 1.2, 1.25, 1.3]);
         let limits = limits(&point, Group::Weights { input: 0 });
         let most: Vec<f64> =
             limits.iter().zip(&point.channels[0].weights).map(|((_, high), w)| w + high).collect();
-        let expected = [10.0, 10.0, 2.0 + 8.0 * 0.1 / (2.5 * 0.05), 2.0, 2.0];
+        let expected = [5.0, 5.0, 1.0 + 4.0 * 0.1 / (2.5 * 0.05), 1.0, 1.0];
         for (found, expected) in most.iter().zip(expected) {
             assert!((found - expected).abs() < 0.01, "{most:?}");
         }

@@ -9,14 +9,16 @@ use crate::chain::point::Point;
 use crate::effects::Stage;
 use crate::{Error, Experiment, Matrix};
 
-/// The output with the effect less that without it, (samples, outputs): `c = y(theta) - y(theta without the effect)`.
+/// The output with the effect less that without it, `c = y(theta) - y(theta without the effect)`, and the latter; each
+/// (samples, outputs).
 pub(super) fn contribution(
     point: &Point,
     without: &Point,
     known: &Signals,
     experiment: &Experiment,
     index: usize,
-) -> Result<Matrix, Error> {
+) -> Result<(Matrix, Matrix), Error> {
     let with = point.output_from(Stage::Added, known, experiment, index)?;
-    Ok(with - without.output_from(Stage::Input, known, experiment, index)?)
+    let rest = without.output_from(Stage::Input, known, experiment, index)?;
+    Ok((with - &rest, rest))
 }

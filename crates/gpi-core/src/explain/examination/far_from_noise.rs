@@ -3,9 +3,9 @@
 //! A drift, a creep, a gap or a sensor's curve is a small part of the output of a stage, and once it is modelled the
 //! error is near the noise. One that is a large part of the output, in a model that is still far from the noise, stands
 //! for a structure that the model lacks: an integrator, friction, another hysteresis. The size is what is left of the
-//! effect's contribution c after a gain and an offset, which the rest of the model can take:
+//! effect's contribution c after a gain a of the output m of the rest of the model and an offset b, which the rest can take:
 //!
-//! `size = min over a, b of rms(c - a y - b) / std(y)`.
+//! `size = min over a, b of rms(c - a m - b) / std(y)`.
 //!
 //! The following effects are not named at all while the model is far from the noise:
 //!
@@ -81,25 +81,25 @@ fn size(state: &SearchState, point: &Point, place: usize) -> Result<f64, Error> 
     let without = point.without_effect(place);
     let record = &state.prepared.record;
     let outputs = record.outputs().len();
-    // of (1, c, y): sums of products
-    let mut sums = vec![nalgebra::Matrix3::<f64>::zeros(); outputs];
+    // of (1, c, m, y): sums of products
+    let mut sums = vec![nalgebra::Matrix4::<f64>::zeros(); outputs];
     for (index, experiment) in record.experiments().iter().enumerate() {
         let known = point.signals(experiment, index)?;
-        let c = contribution(point, &without, &known, experiment, index)?;
+        let (c, m) = contribution(point, &without, &known, experiment, index)?;
         for k in experiment.scored_runs().flatten() {
             for (output, sum) in sums.iter_mut().enumerate() {
-                let y = experiment.output[(k, output)];
-                let row = nalgebra::Vector3::new(1.0, c[(k, output)], y);
+                let at = (k, output);
+                let row = nalgebra::Vector4::new(1.0, c[at], m[at], experiment.output[at]);
                 *sum += row * row.transpose();
             }
         }
     }
-    let of = |sum: &nalgebra::Matrix3<f64>| {
+    let of = |sum: &nalgebra::Matrix4<f64>| {
         let n = sum[(0, 0)];
         let covariance = |i: usize, j: usize| sum[(i, j)] / n - sum[(0, i)] * sum[(0, j)] / (n * n);
-        let output = covariance(2, 2).max(f64::MIN_POSITIVE);
-        let own = covariance(1, 1) - covariance(1, 2).powi(2) / output;
-        (own.max(0.0) / output).sqrt()
+        let rest = covariance(2, 2).max(f64::MIN_POSITIVE);
+        let own = covariance(1, 1) - covariance(1, 2).powi(2) / rest;
+        (own.max(0.0) / covariance(3, 3).max(f64::MIN_POSITIVE)).sqrt()
     };
     Ok(sums.iter().map(of).fold(0.0, f64::max))
 }

@@ -48,7 +48,7 @@ pub(super) fn is_beyond_chance(
     let base = Base::of(point, record, options.freedom, &options.loss, others)?;
     let without = point.without_effect(place);
     let columns = |known: &Signals, _: &Matrix, experiment: &Experiment, index: usize| {
-        Ok(vec![contribution(point, &without, known, experiment, index)?])
+        Ok(vec![contribution(point, &without, known, experiment, index)?.0])
     };
     let left = base.project(&[1], &columns)?.left[(0, 0)];
     let least = exceeded_with(policy.chance, |value| chi_square_tail(value, own.max(1) as f64));
