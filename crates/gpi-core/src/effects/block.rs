@@ -42,4 +42,9 @@ pub trait Block {
     fn is_plausible(&self, _duration: f64) -> bool {
         true
     }
+
+    /// Drops the terms of a sum that make these values implausible; `false` if there are none, or if no term would be left.
+    fn drop_implausible(&mut self, _duration: f64) -> bool {
+        false
+    }
 }

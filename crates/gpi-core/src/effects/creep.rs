@@ -105,6 +105,19 @@ impl Block for Creep {
             && self.time_constants.iter().all(|&time| time < duration)
     }
 
+    /// Drops the lags that relax in the other direction than the whole, and those that are slower than the record.
+    fn drop_implausible(&mut self, duration: f64) -> bool {
+        let total: f64 = self.gains.iter().sum();
+        let lags = self.time_constants.iter().copied().zip(self.gains.iter().copied());
+        let stays = |&(time, gain): &(f64, f64)| gain * total >= 0.0 && time < duration;
+        let (times, gains): (Vec<f64>, Vec<f64>) = lags.filter(stays).unzip();
+        if times.is_empty() || times.len() == self.time_constants.len() {
+            return false;
+        }
+        (self.time_constants, self.gains) = (times, gains);
+        true
+    }
+
     fn quantities(&self, _: Units) -> Vec<Quantity> {
         let mut quantities = Vec::new();
         for (i, (&time, &gain)) in self.time_constants.iter().zip(&self.gains).enumerate() {
@@ -175,5 +188,20 @@ mod tests {
         assert!(creep(&[0.2], &[-0.03]).is_plausible(20.0));
         assert!(!creep(&[0.2, 3.0], &[0.03, -0.01]).is_plausible(20.0));
         assert!(!creep(&[0.2, 375.0], &[0.03, 0.01]).is_plausible(20.0));
+    }
+
+    #[test]
+    fn lags_of_the_other_direction_and_trends_are_dropped() {
+        let creep = |times: &[f64], gains: &[f64]| Creep {
+            input: 0,
+            time_constants: times.to_vec(),
+            gains: gains.to_vec(),
+            dead_time: 0,
+        };
+        let mut own = creep(&[0.2, 3.0, 375.0], &[0.03, -0.01, 0.02]);
+        assert!(own.drop_implausible(20.0));
+        assert_eq!(own, creep(&[0.2], &[0.03]));
+        assert!(!own.drop_implausible(20.0));
+        assert!(!creep(&[375.0], &[0.03]).drop_implausible(20.0));
     }
 }

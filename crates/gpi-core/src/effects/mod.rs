@@ -204,6 +204,13 @@ impl Effect {
         coarser.place_mut().block().is_some_and(Block::coarsen).then_some(coarser)
     }
 
+    /// The same without the terms of a sum that make its values implausible, if there are any and others are left.
+    pub(crate) fn plausible_part(&self, duration: f64) -> Option<Self> {
+        let mut part = self.clone();
+        let is_dropped = |block: &mut dyn Block| block.drop_implausible(duration);
+        part.place_mut().block().is_some_and(is_dropped).then_some(part)
+    }
+
     /// The same on the other side of the output stage, if it is an added signal.
     pub(crate) fn elsewhere(&self) -> Option<Self> {
         let mut moved = self.clone();

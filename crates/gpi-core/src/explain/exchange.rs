@@ -22,7 +22,7 @@
 use super::judgement::{Significance, is_superfluous};
 use super::ranking::{Ranked, scored_beside};
 use super::state::{Addition, SearchState, Trial};
-use super::trial::{measured, start, threshold};
+use super::trial::{measured, plausible_part, start, threshold};
 use crate::Error;
 use crate::Progress;
 use crate::chain::point::Point;
@@ -50,7 +50,11 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
         let start = start(state, &without, score)?;
         let options = longer(state);
         let fitted = as_trial(progress, ("exchange", entry.name), (0, 1), |progress| {
-            state.fit(start, &options, entry.name, progress)
+            let fitted = state.fit(start, &options, entry.name, progress)?;
+            match plausible_part(state, &fitted.point, entry) {
+                Some(part) => state.fit(part, &options, entry.name, progress),
+                None => Ok(fitted),
+            }
         })?;
         let threshold = settle(state, slow, state.setup.unknowns(&without), deviance, progress)?;
         let trial = measured(state, &without, entry, fitted, options, gain, progress)?;

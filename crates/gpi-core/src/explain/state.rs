@@ -142,11 +142,15 @@ impl<'a> SearchState<'a> {
 
     /// Whether every effect of a point has parameters that a machine can have.
     pub(super) fn is_plausible(&self, point: &Point) -> bool {
+        let (blocks, duration) = (point.blocks(), self.duration());
+        blocks.iter().filter_map(Effect::block).all(|block| block.is_plausible(duration))
+    }
+
+    /// The longest experiment in seconds.
+    pub(super) fn duration(&self) -> f64 {
         let record = &self.prepared.record;
         let longest = record.experiments().iter().map(|e| e.input.nrows()).max();
-        let duration = longest.unwrap_or(0) as f64 / record.rate();
-        let blocks = point.blocks();
-        blocks.iter().filter_map(Effect::block).all(|block| block.is_plausible(duration))
+        longest.unwrap_or(0) as f64 / record.rate()
     }
 
     /// Training squares of a point.

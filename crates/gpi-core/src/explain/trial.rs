@@ -13,7 +13,8 @@
 //! A fit begins where the score test says, at `b = L^-1 s` (see [`super::score`]). It begins at the effect without
 //! action where b violates the effect's bounds, or where the squares at b exceed those of the present model by a
 //! factor: the linear prediction does not hold there. A fit that used all its steps and still lowered the squares over
-//! its last ones is continued.
+//! its last ones is continued. Terms of the effect that are implausible at its end are taken out, and the rest is fitted
+//! once more.
 //!
 //! The threshold of D is a function of numbers ([`Significance`]). If D lies between the threshold for white noise and
 //! where autocorrelation could no longer matter, the residual's autocorrelation is measured by
@@ -105,13 +106,37 @@ pub(super) fn fitted(
         options = state.setup.moving_grids.clone();
         fitted = state.fit(fitted.point, &options, entry.name, progress)?;
     }
+    fitted = continued(state, fitted, &options, entry, progress)?;
+    if let Some(part) = plausible_part(state, &fitted.point, entry) {
+        fitted = state.fit(part, &options, entry.name, progress)?;
+        fitted = continued(state, fitted, &options, entry, progress)?;
+    }
+    Ok((fitted, options))
+}
+
+/// A fit that is continued as long as it makes progress.
+fn continued(
+    state: &SearchState,
+    mut fitted: Fitted,
+    options: &FitOptions,
+    entry: &Entry,
+    progress: Progress,
+) -> Result<Fitted, Error> {
     for _ in 0..state.setup.policy.fits.more {
         if !makes_progress(&fitted, &state.setup.policy.fits) {
             break;
         }
-        fitted = state.fit(fitted.point, &options, entry.name, progress)?;
+        fitted = state.fit(fitted.point, options, entry.name, progress)?;
     }
-    Ok((fitted, options))
+    Ok(fitted)
+}
+
+/// A point whose newest effect of an entry has lost the terms that make it implausible. They may only have made up for each
+/// other.
+pub(super) fn plausible_part(state: &SearchState, point: &Point, entry: &Entry) -> Option<Point> {
+    let place = point.effects.iter().rposition(|effect| effect.name() == entry.name)?;
+    let part = point.effects[place].plausible_part(state.duration())?;
+    Some(point.without_effect(place).with_effect(part))
 }
 
 /// A point with one more effect: as the score test suggests it, or without effect yet where that is beyond what is
