@@ -123,7 +123,8 @@ fn continued(
     progress: Progress,
 ) -> Result<Fitted, Error> {
     for _ in 0..state.setup.policy.fits.more {
-        if !makes_progress(&fitted, &state.setup.policy.fits) {
+        let (status, cost) = (fitted.status, fitted.linearization.cost);
+        if !makes_progress(status, &fitted.history, cost, &state.setup.policy.fits) {
             break;
         }
         fitted = state.fit(fitted.point, options, entry.name, progress)?;
@@ -226,10 +227,26 @@ fn is_driven(state: &SearchState, without: &Point, with: &Point) -> Result<bool,
 }
 
 /// Whether the last steps of a fit that had no more were long ones; all steps where it took few, because most that it
-/// tried failed.
-fn makes_progress(fitted: &Fitted, policy: &FitPolicy) -> bool {
-    let history = &fitted.history;
-    let before = history[history.len().saturating_sub(policy.last_steps + 1)];
-    let is_lower = fitted.linearization.cost < (1.0 - policy.progress) * before;
-    fitted.status == Status::Limit && is_lower
+/// tried failed. `history` are the squares at the start and after each step, `cost` those at the end.
+fn makes_progress(status: Status, history: &[f64], cost: f64, policy: &FitPolicy) -> bool {
+    let before = history.get(history.len().saturating_sub(policy.last_steps + 1));
+    status == Status::Limit && before.is_some_and(|before| cost < (1.0 - policy.progress) * before)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fit_goes_on_where_its_last_steps_were_long() {
+        let policy = FitPolicy { last_steps: 2, progress: 0.1, ..FitPolicy::default() };
+        let goes_on = |status, history: &[f64], cost| makes_progress(status, history, cost, &policy);
+        // by 20 % in the last two steps, by 2 %, and by 20 % in the only one
+        assert!(goes_on(Status::Limit, &[9.0, 5.0, 4.5, 4.0], 4.0));
+        assert!(!goes_on(Status::Limit, &[9.0, 4.08, 4.05, 4.0], 4.0));
+        assert!(goes_on(Status::Limit, &[5.0, 4.0], 4.0));
+        // what has converged, or has not moved, has nothing to gain
+        assert!(!goes_on(Status::Converged, &[9.0, 5.0, 4.5, 4.0], 4.0));
+        assert!(!goes_on(Status::Limit, &[], 4.0));
+    }
 }
