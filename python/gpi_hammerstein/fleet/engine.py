@@ -23,7 +23,7 @@ from gpi_hammerstein.fleet.work import Task, work
 AHEAD = 2
 # How often a record is tried alone, until it is given up.
 ATTEMPTS = 2
-# Tasks in an executor that somebody else made, whose number of workers is not known: enough for some thousands.
+# Tasks in an executor that somebody else made, whose number of workers is not known: enough for thousands.
 # What waits in a scheduler costs it memory, some kilobytes for each task.
 WINDOW = 10_000
 GIB = 1 << 30
