@@ -240,7 +240,8 @@ mod tests {
     #[test]
     fn a_fit_goes_on_where_its_last_steps_were_long() {
         let policy = FitPolicy { last_steps: 2, progress: 0.1, ..FitPolicy::default() };
-        let goes_on = |status, history: &[f64], cost| makes_progress(status, history, cost, &policy);
+        let goes_on =
+            |status, history: &[f64], cost| makes_progress(status, history, cost, &policy);
         // by 20 % in the last two steps, by 2 %, and by 20 % in the only one
         assert!(goes_on(Status::Limit, &[9.0, 5.0, 4.5, 4.0], 4.0));
         assert!(!goes_on(Status::Limit, &[9.0, 4.08, 4.05, 4.0], 4.0));
