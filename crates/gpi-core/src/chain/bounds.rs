@@ -49,8 +49,8 @@ const STEEPEST: f64 = 5.0;
 /// steep. By hand: less is seen at the ends of the movement only.
 const RARE: f64 = 0.05;
 
-/// The largest slope over the mean slope of a part of the hysteresis: 1 where the record does not show it, [`STEEPEST`]
-/// where it is shown `shown >= 1` times as well as needed.
+/// The largest slope of a part of the hysteresis, divided by the mean slope. It rises from 1 at `shown = 0`, where the record
+/// does not show the part, to [`STEEPEST`] at `shown = 1` and above.
 fn steepness(shown: f64) -> f64 {
     let shown = if shown > 0.0 { shown.min(1.0) } else { 0.0 };
     1.0 + (STEEPEST - 1.0) * shown
