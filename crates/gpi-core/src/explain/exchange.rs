@@ -68,7 +68,6 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
             && is_superfluous(lost, threshold, [&held_out, &trial.held_out], factor)
         {
             let dropped = vec![slow.name];
-            state.point = trial.point.clone();
             state.add(Addition { trial, others: Vec::new(), dropped })?;
             // the grids were placed, and the effect's terms counted, beside the slow function
             state.is_rich = false;
@@ -171,7 +170,6 @@ pub(super) fn exchange_slow(state: &mut SearchState, progress: Progress) -> Resu
         let held_out = state.held_out(&state.point)?;
         let lost = lost(state, &trial, &held_out) + price;
         if -lost > 2.0 * state.setup.policy.judgement.looks.ln() {
-            state.point = trial.point.clone();
             let dropped = vec![own.name];
             state.add(Addition { trial, others: Vec::new(), dropped })?;
         }

@@ -117,6 +117,7 @@ pub(super) fn shed_lags(state: &mut SearchState, progress: Progress) -> Result<b
     let additions = state.additions.len();
     state.before_lags = Some(BeforeLags { point: before, cost: state.cost, additions });
     state.cost = fitted.linearization.cost;
+    state.left.clear();
     state.is_rich = false;
     Ok(true)
 }
@@ -135,6 +136,7 @@ pub(super) fn shed_lines(state: &mut SearchState, progress: Progress) -> Result<
     let Some(point) = state.point.without(is_line)? else { return Ok(false) };
     let fitted = state.fit(point, &state.setup.options, "lines", progress)?;
     (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
+    state.left.clear();
     state.is_rich = false;
     Ok(true)
 }

@@ -54,9 +54,7 @@ fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
         };
         let entry = state.point.effects[place].entry();
         let holdout_rms = state.setup.holdout_rms(&state.held_out(&state.point)?);
-        let without = state.point.without_effect(place);
-        let fitted = state.fit(without, &state.setup.options, "without it", progress)?;
-        (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
+        state.remove(place, progress)?;
         let why = why.in_words("the model");
         let (effect, confounded_with) = (entry.name, Vec::new());
         state.refused.push(Rejected { effect, holdout_rms, why, confounded_with });
@@ -123,10 +121,9 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
         (state.point, state.cost) = (better.point, better.linearization.cost);
         return Ok(true);
     };
-    let trial = trials.swap_remove(taken);
-    state.point = trial.point.clone();
+    let mut trial = trials.swap_remove(taken);
     if trial.entry.free_order == FreeOrder::JoinsG && !state.setup.order_is_given {
-        join_modes(&mut state.point);
+        join_modes(&mut trial.point);
     }
     state.add(Addition { trial, others, dropped: Vec::new() })?;
     // the grids were placed before this effect was known
@@ -200,6 +197,5 @@ pub(super) fn force(
     let trial = as_trial(progress, ("trials", entry.name), (0, 1), |progress| {
         trial(state, best, progress)
     })?;
-    state.point = trial.point.clone();
     state.add(Addition { trial, others: Vec::new(), dropped: Vec::new() })
 }

@@ -23,6 +23,7 @@ use crate::identify::NoiseFloor;
 use crate::progress::Progress;
 use crate::uncertainty::outliers;
 use crate::{Error, Record};
+use std::collections::BTreeSet;
 
 /// What a fit with one more effect brought.
 #[derive(Clone)]
@@ -94,6 +95,8 @@ pub(super) struct SearchState<'a> {
     pub before_lags: Option<BeforeLags>,
     /// What was added.
     pub additions: Vec<Addition>,
+    /// The models before each addition, as long as the poles of G may come back that they have.
+    pub left: Vec<Point>,
     /// Isolated wrong samples, `[experiment][output]`.
     pub wrong: Vec<Vec<Vec<usize>>>,
     /// What was tried in the last round and not taken.
@@ -113,6 +116,7 @@ impl<'a> SearchState<'a> {
             is_rich: false,
             before_lags: None,
             additions: Vec::new(),
+            left: Vec::new(),
             wrong: Vec::new(),
             last: Vec::new(),
             refused: Vec::new(),
@@ -187,10 +191,28 @@ impl<'a> SearchState<'a> {
         Ok(squares.sum::<f64>() * record.scored() as f64)
     }
 
-    /// Remembers what led to the point.
+    /// Takes the model of a trial, and remembers what led to it.
     pub(super) fn add(&mut self, addition: Addition) -> Result<(), Error> {
+        self.left.push(std::mem::replace(&mut self.point, addition.trial.point.clone()));
         self.additions.push(addition);
         self.repair()
+    }
+
+    /// Takes the best model without one of its effects: fitted from where the effect left the rest, which may be far
+    /// from where the rest is alone, or one that the search had before with the same effects.
+    pub(super) fn remove(&mut self, place: usize, progress: Progress) -> Result<(), Error> {
+        let without = self.point.without_effect(place);
+        let names = |point: &Point| point.effects.iter().map(Effect::name).collect::<BTreeSet<_>>();
+        let wanted = names(&without);
+        let fitted = self.fit(without, &self.setup.options, "without it", progress)?;
+        (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
+        for known in self.left.iter().filter(|known| names(known) == wanted) {
+            let cost = self.training_squares(known)?;
+            if cost < self.cost {
+                (self.point, self.cost) = (known.clone(), cost);
+            }
+        }
+        Ok(())
     }
 
     /// Finds isolated outliers of the residual and replaces them, also where the record is held out: a wrong sample
