@@ -184,6 +184,7 @@ PREDICTION = closed(
         "misfit": listed(size()),
         "movement": listed(size()),
     },
+    {"largest_misfit": listed(size(), "of the second in which it is largest")},
     said="What the model knows about the errors of its simulations.",
 )
 MODEL = closed(

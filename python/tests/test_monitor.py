@@ -66,6 +66,19 @@ def test_an_unchanged_machine_raises_no_alarm(model):
     assert monitor.watched == ["offset", "gain", "resonance", "hysteresis-width", "noise", "line"]
 
 
+def test_what_the_training_record_contains_is_no_change():
+    u = np.r_[np.zeros(100), drive(1), drive(2)]
+    y = stage(u) + noise(0, len(u))
+    # the machine ran in for three seconds, which the model does not describe
+    y[2000:2300] += 20 * NOISE
+    model = gpi.identify(gpi.Record(u, y, RATE), half_widths=[0.0, 0.8, 1.6, 2.4], thresholds=0, order=2)
+    known = json.loads(model.to_json())["prediction"]
+    assert known["largest_misfit"][0] > 15 * NOISE > 2 * known["misfit"][0]
+    monitor = gpi.Monitor(model)
+    monitor.push(u, y)
+    assert monitor.changes == []
+
+
 @pytest.mark.parametrize(
     ("what", "changed", "size"),
     [

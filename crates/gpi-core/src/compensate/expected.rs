@@ -222,7 +222,8 @@ mod tests {
         // the numbers: threshold, slope, half-widths, weights, D, offset; axes of the first weight and of the offset
         let axes = vec![vec![0.01, 0.0], vec![0.0, 0.03]];
         let (misfit, movement) = (vec![0.02], vec![0.5]);
-        let prediction = Prediction { numbers: vec![4, 7], axes, misfit, movement };
+        let prediction =
+            Prediction { numbers: vec![4, 7], axes, misfit, movement, largest_misfit: vec![] };
         model.prediction = Some(prediction);
         let options =
             CompensateOptions { start: Some(Start::Input(vec![0.0])), ..Default::default() };

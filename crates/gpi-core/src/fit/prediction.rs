@@ -80,8 +80,8 @@ impl Model {
         let known = ("refinement", refinement.residuals.len());
         Error::require_equal("experiments", experiments, known)?;
         let Ok((numbers, axes)) = axes_of(&self, refinement, record) else { return Ok(self) };
-        let Misfit { misfit, movement } = Misfit::of(&self, refinement, record)?;
-        let prediction = Prediction { numbers, axes, misfit, movement };
+        let Misfit { misfit, movement, largest_misfit } = Misfit::of(&self, refinement, record)?;
+        let prediction = Prediction { numbers, axes, misfit, movement, largest_misfit };
         self.prediction = prediction.is_finite().then_some(prediction);
         Ok(self)
     }

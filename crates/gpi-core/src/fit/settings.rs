@@ -204,6 +204,10 @@ settings! {
         lags: [usize; 3] = [1, 3, 10], FROM_ONE;
         /// Standard errors of white noise that a mean must exceed: noise alone does so once in forty times.
         standard_errors: f64 = 2.0, 0.0..=100.0;
+        /// Length in seconds, and number of samples at least, of the pieces of which the largest misfit is known: those of
+        /// the blocks of a monitor.
+        seconds: f64 = 1.0, POSITIVE;
+        samples: usize = 100, FROM_ONE;
     }
 }
 

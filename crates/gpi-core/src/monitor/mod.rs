@@ -189,11 +189,13 @@ impl Monitor {
     }
 
     /// The mean square of the error of an output that is always known to be possible, in its unit squared: what the training
-    /// record may hide, and the misfit.
+    /// record may hide, and the misfit: twice that of the whole record, or that of its worst second.
     pub fn always_known(&self, output: usize) -> f64 {
-        let misfit = self.model.prediction().map_or(0.0, |own| own.misfit()[output]);
-        (self.settings.hidden * self.noise[output]).powi(2)
-            + (self.settings.unseen * misfit).powi(2)
+        let misfit = self.model.prediction().map_or(0.0, |own| {
+            let largest = own.largest_misfit().get(output).copied().unwrap_or(0.0);
+            largest.max(self.settings.unseen * own.misfit()[output])
+        });
+        (self.settings.hidden * self.noise[output]).powi(2) + misfit.powi(2)
     }
 
     /// Length of a block, in samples: tests are made at the end of each.

@@ -19,6 +19,9 @@ pub struct Prediction {
     pub(crate) misfit: Vec<f64>,
     /// Of each output, the root mean square movement about its mean in the training data, in its unit.
     pub(crate) movement: Vec<f64>,
+    /// Of each output, the misfit of that second of the training data in which it was largest; empty if it is not known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) largest_misfit: Vec<f64>,
 }
 
 impl Prediction {
@@ -32,9 +35,15 @@ impl Prediction {
         &self.movement
     }
 
+    /// Of each output, the misfit of that second of the training data in which it was largest, in the unit of the output;
+    /// empty for a model that was saved by a version that did not determine it.
+    pub fn largest_misfit(&self) -> &[f64] {
+        &self.largest_misfit
+    }
+
     /// Whether every number is finite, as a file requires.
     pub(crate) fn is_finite(&self) -> bool {
-        let sizes = self.misfit.iter().chain(&self.movement);
+        let sizes = self.misfit.iter().chain(&self.movement).chain(&self.largest_misfit);
         self.axes.iter().flatten().all(|part| part.is_finite())
             && sizes.into_iter().all(|value| value.is_finite())
     }
@@ -53,6 +62,10 @@ impl Prediction {
             [("prediction.misfit", &self.misfit), ("prediction.movement", &self.movement)]
         {
             Error::require_equal("outputs", (name, values.len()), outputs)?;
+        }
+        if !self.largest_misfit.is_empty() {
+            let largest = ("prediction.largest_misfit", self.largest_misfit.len());
+            Error::require_equal("outputs", largest, outputs)?;
         }
         Ok(())
     }
