@@ -15,6 +15,7 @@ from gpi_hammerstein.summary import Parameter, Summary
 _Array: TypeAlias = NDArray[np.float64]
 _ComplexArray: TypeAlias = NDArray[np.complex128]
 _Reading: TypeAlias = Literal["one-sided", "directional"]
+_Hysteresis: TypeAlias = Literal["plays", "stops"]
 _RecordLike: TypeAlias = Record | str | PathLike[str]
 
 __all__ = [
@@ -576,6 +577,7 @@ def identify(
     half_widths: ArrayLike | int | None = None,
     thresholds: ArrayLike | int | None = None,
     reading: _Reading = "one-sided",
+    hysteresis: _Hysteresis | None = None,
     delay: int | None = None,
     robust: bool | None = None,
     offset_knots: int = 1,
@@ -610,6 +612,7 @@ def explain(
     thresholds: int | ArrayLike | None = None,
     delay: int | None = None,
     reading: _Reading = "one-sided",
+    hysteresis: _Hysteresis | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> Explanation: ...
 def effect_names() -> dict[str, str]: ...

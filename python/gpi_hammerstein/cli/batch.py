@@ -62,6 +62,7 @@ def batch(
     thresholds: options.Thresholds = None,
     delay: options.Delay = None,
     reading: options.Reading = "one-sided",
+    hysteresis: options.Hysteresis = None,
     workers: Annotated[
         int | None,
         typer.Option(
@@ -114,6 +115,7 @@ def batch(
         "thresholds": options.parse_numbers("thresholds", thresholds),
         "delay": delay,
         "reading": None if reading == "one-sided" else reading,
+        "hysteresis": hysteresis,
     }
     with cluster(scheduler, dask, workers) as client, bar() as tell:
         table = run(

@@ -55,6 +55,7 @@ def explain(
     thresholds: options.Thresholds = None,
     delay: options.Delay = None,
     reading: options.Reading = "one-sided",
+    hysteresis: options.Hysteresis = None,
     out: options.Out = None,
     report: Annotated[
         bool, typer.Option("--report", help="Also write report.html, one page with all results, to DIR.")
@@ -92,6 +93,7 @@ def explain(
         thresholds=options.parse_numbers("thresholds", thresholds),
         delay=delay,
         reading=reading,
+        hysteresis=hysteresis,
     )
     result = to_dict(found)
     result["record"] = describe_record(recording, records)

@@ -66,6 +66,7 @@ def identify(
     thresholds: options.Thresholds = None,
     delay: options.Delay = None,
     reading: options.Reading = "one-sided",
+    hysteresis: options.Hysteresis = None,
     offset_knots: Annotated[
         int,
         typer.Option(
@@ -113,6 +114,7 @@ def identify(
             half_widths=options.parse_numbers("half_widths", half_widths),
             thresholds=options.parse_numbers("thresholds", thresholds),
             reading=reading,
+            hysteresis=hysteresis,
             delay=delay,
             robust=robust,
             offset_knots=offset_knots,

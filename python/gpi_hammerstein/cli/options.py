@@ -173,6 +173,15 @@ Reading = Annotated[
         help="Deadzone convention: a function of u alone, or of u and its direction.", rich_help_panel=MODEL
     ),
 ]
+Hysteresis = Annotated[
+    Literal["plays", "stops"] | None,
+    typer.Option(
+        help="Plays, whose output lags behind the input, or stops, whose output leads it (friction). "
+        "Default: what the data ask for.",
+        show_default=False,
+        rich_help_panel=MODEL,
+    ),
+]
 Out = Annotated[
     Path | None,
     typer.Option(

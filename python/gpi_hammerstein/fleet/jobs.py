@@ -15,7 +15,7 @@ from gpi_hammerstein._native import DataError, ParameterError, __version__
 from gpi_hammerstein.io.formats import FORMATS
 
 READ = ("input", "output", "time", "rate", "covariate", "resample", "warmup", "experiment")
-EXPLAIN = ("effects", "require", "order", "half_widths", "thresholds", "delay", "reading")
+EXPLAIN = ("effects", "require", "order", "half_widths", "thresholds", "delay", "reading", "hysteresis")
 BLOCK = 1 << 20
 
 

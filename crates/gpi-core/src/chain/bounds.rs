@@ -22,6 +22,7 @@
 //! half-width of the widest play that has a weight does. The row of C of the reference output fixes the scale of a
 //! section's states; the half-width zero and the threshold zero are the linear terms and never move.
 
+use super::hysteresis::Elements;
 use super::movement::{Path, scored};
 use super::point::{Freedom, Point};
 use super::table::{Group, Table};
@@ -83,12 +84,22 @@ impl Point {
                 let moved = self.envelope_span(record, input);
                 let widths = &self.channels[input].half_widths;
                 let slides = |r: f64| 1.0 - 2.0 * r / moved;
-                let v: f64 = values.iter().zip(widths).map(|(w, &r)| w * slides(r).max(0.0)).sum();
-                // nothing is known of plays without any weight
+                let elements = self.channels[input].elements;
+                let v: f64 = match elements {
+                    Elements::Plays => {
+                        values.iter().zip(widths).map(|(w, &r)| w * slides(r).max(0.0)).sum()
+                    }
+                    // behind a reversal, where all stops move
+                    Elements::Stops => values[0],
+                };
+                // nothing is known of a bank without any weight
                 let mean = if v > 0.0 { v } else { f64::INFINITY };
                 let most = |r: f64| mean * steepness(slides(r) / RARE);
-                let pairs = values.iter().zip(widths);
-                pairs.map(|(weight, &r)| (-weight, most(r) - weight)).collect()
+                let limits = |(place, (&weight, &r)): (usize, (&f64, &f64))| {
+                    let ends = [-1.0, 1.0].map(|end| elements.nearest(place, end * most(r)));
+                    (ends[0] - weight, ends[1] - weight)
+                };
+                values.iter().zip(widths).enumerate().map(limits).collect()
             }
             Group::Slopes { input } => {
                 let is_held = !freedom.identity || self.widest_used(input) == 0;
@@ -176,7 +187,7 @@ impl Point {
 
     /// The place of the widest play with a weight.
     fn widest_used(&self, input: usize) -> usize {
-        self.channels[input].weights.iter().rposition(|&weight| weight > 0.0).unwrap_or(0)
+        self.channels[input].weights.iter().rposition(|&weight| weight != 0.0).unwrap_or(0)
     }
 }
 

@@ -5,6 +5,12 @@
 //! v(k) = sum_i p_i q_i(F_i(k)),  F_i the play of half-width r_i of z; r_0 = 0, F_0 = z
 //! ```
 //!
+//! The weights are those of plays, p_i >= 0, or of stops `z - F_i`, g_i >= 0 (see [`Elements`]):
+//!
+//! ```text
+//! v = g_0 z + sum_i g_i (z - F_i) = p_0 z + sum_i p_i F_i,      p_0 = g_0 + sum_i g_i,   p_i = -g_i  (i > 0)
+//! ```
+//!
 //! It is the generalised Prandtl-Ishlinskii operator in the parametrisation of the fit. Z_eta is the deadzone of
 //! threshold eta, one-sided (`Z_0 = u`) or directional. The parametrisation keeps the linear terms `eta_0 = 0` and
 //! `r_0 = 0` first even where their values are zero, so that places do not move. [`Parameters::to_operator`] drops what
@@ -16,11 +22,46 @@ use crate::effects::{Effect, PlayCurves};
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
 use crate::{Hysteresis, Matrix};
 
+/// What a bank consists of, which is the sign of its weights: `v = p_0 z + sum_i p_i F_i(z)` with `p_0 >= 0`, and `p_i >= 0`
+/// for plays or `p_i <= 0` for stops `-p_i (z - F_i(z))`. A bank of stops is the model of Maxwell slip.
+///
+/// ```
+/// use gpi_core::identify::{Elements, IdentifyOptions};
+/// let options = IdentifyOptions { elements: Some(Elements::Stops), ..IdentifyOptions::default() };
+/// assert_eq!(options.elements, Some(Elements::Stops));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Elements {
+    /// Plays: v lags behind z, as the displacement of a piezo lags behind its voltage.
+    #[default]
+    Plays,
+    /// Stops: v leads z, as the force of friction leads the displacement.
+    Stops,
+}
+
+impl Elements {
+    /// The elements of weights at half-widths: stops where those above zero have a negative sum.
+    fn of(half_widths: &[f64], weights: &[f64]) -> Self {
+        let pairs = half_widths.iter().zip(weights);
+        let all: f64 = pairs.filter(|(r, _)| **r > 0.0).map(|(_, weight)| weight).sum();
+        if all < 0.0 { Self::Stops } else { Self::Plays }
+    }
+
+    /// The nearest weight that the element at a place of the bank can have; the first is the linear term.
+    pub(crate) fn nearest(self, place: usize, weight: f64) -> f64 {
+        match self {
+            Self::Stops if place > 0 => weight.min(0.0),
+            Self::Plays | Self::Stops => weight.max(0.0),
+        }
+    }
+}
+
 /// Parameters of one hysteresis: `z = sum_j g_j Z_{eta_j}(u)`, then plays.
 ///
 /// The first threshold is 0, whose one-sided deadzone is the identity; the first half-width is 0 too.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Parameters {
+    pub elements: Elements,
     pub reading: Reading,
     pub thresholds: Vec<f64>,
     pub slopes: Vec<f64>,
@@ -42,7 +83,8 @@ impl Parameters {
             values
         };
         let (slopes, weights) = (first(thresholds.len()), first(half_widths.len()));
-        Self { reading, thresholds, slopes, half_widths, weights }
+        let elements = Elements::default();
+        Self { elements, reading, thresholds, slopes, half_widths, weights }
     }
 
     /// The parameters of an operator; the identity and the play of half-width zero are added where
@@ -58,8 +100,10 @@ impl Parameters {
         };
         let (envelope, plays) = (hysteresis.envelope(), hysteresis.plays());
         let (thresholds, slopes) = with_zero(envelope.thresholds(), envelope.weights());
-        let (half_widths, weights) = with_zero(plays.half_widths(), plays.weights());
-        Self { reading: envelope.reading(), thresholds, slopes, half_widths, weights }
+        let (half_widths, weights): (Vec<f64>, Vec<f64>) =
+            with_zero(plays.half_widths(), plays.weights());
+        let elements = Elements::of(&half_widths, &weights);
+        Self { elements, reading: envelope.reading(), thresholds, slopes, half_widths, weights }
     }
 
     /// z for one sample of u.

@@ -224,6 +224,7 @@ impl<'a> Sensitivity<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::hysteresis::Elements;
     use crate::effects::{Effect, HysteresisShape};
     use crate::operators::Operator;
 
@@ -252,6 +253,7 @@ mod tests {
     #[test]
     fn derivatives_agree_with_differences_of_the_operator() {
         let parameters = Parameters {
+            elements: Elements::Plays,
             reading: Reading::OneSided,
             thresholds: vec![0.0, -0.7, 0.6],
             slopes: vec![1.1, 0.3, -0.4],
@@ -311,6 +313,7 @@ mod tests {
     #[test]
     fn curves_that_depend_on_the_half_width_are_in_its_derivative() {
         let parameters = Parameters {
+            elements: Elements::Plays,
             reading: Reading::OneSided,
             thresholds: vec![0.0],
             slopes: vec![1.0],

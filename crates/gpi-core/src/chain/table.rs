@@ -20,6 +20,7 @@
 //! The first two act on steps beyond the bounds or the region of stability only. The third is smooth, and the
 //! derivatives of [`super::injections`] contain it.
 
+use super::hysteresis::Parameters;
 use super::point::{DynamicsFreedom, Freedom, Point};
 use crate::effects::Coefficients;
 use crate::linear::move_poles;
@@ -267,7 +268,7 @@ impl Group {
         }
     }
 
-    /// Adds a change of the group's values to a point. Weights of plays stay at least zero; a section whose poles
+    /// Adds a change of the group's values to a point. Weights keep the sign of their elements; a section whose poles
     /// would leave the unit circle goes as far as they stay inside.
     fn add(self, point: &mut Point, change: &[f64]) {
         let add = |values: &mut [f64]| {
@@ -275,9 +276,11 @@ impl Group {
         };
         match self {
             Weights { input } => {
-                let weights = &mut point.channels[input].weights;
+                let Parameters { weights, elements, .. } = &mut point.channels[input];
                 add(weights);
-                weights.iter_mut().for_each(|weight| *weight = weight.max(0.0));
+                for (place, weight) in weights.iter_mut().enumerate() {
+                    *weight = elements.nearest(place, *weight);
+                }
             }
             Slopes { input } => add(&mut point.channels[input].slopes),
             Thresholds { input } => add(&mut point.channels[input].thresholds),

@@ -107,7 +107,7 @@ impl<'a> Base<'a> {
             self.signals.iter().map(|signals| choose(signals).clone()).collect()
         };
         let widest = self.point.channels.iter().map(|channel| {
-            let used = channel.half_widths.iter().zip(&channel.weights).filter(|(_, p)| **p > 0.0);
+            let used = channel.half_widths.iter().zip(&channel.weights).filter(|(_, p)| **p != 0.0);
             used.map(|(r, _)| *r).fold(0.0, f64::max)
         });
         let drives = select(|signals| &signals.drive);

@@ -123,9 +123,11 @@ impl Parameters {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::hysteresis::Elements;
 
     fn envelope(thresholds: &[f64], slopes: &[f64]) -> Parameters {
         Parameters {
+            elements: Elements::Plays,
             reading: Reading::OneSided,
             thresholds: thresholds.to_vec(),
             slopes: slopes.to_vec(),

@@ -97,7 +97,7 @@ fn spread(point: &mut Point, input: usize, step: f64, settings: &DenseSettings) 
 fn join_neighbours(point: &mut Point, input: usize, step: f64) {
     let mut used = plays(point, input).into_iter();
     let linear: Vec<Play> = used.by_ref().take(1).collect();
-    let used: Vec<Play> = used.filter(|play| play.weight > 0.0).collect();
+    let used: Vec<Play> = used.filter(|play| play.weight != 0.0).collect();
     let is_within =
         |run: &[Play], play: &Play, reach: f64| play.half_width - run[0].half_width < reach * step;
     // half-widths of the grid are whole steps apart

@@ -255,6 +255,7 @@ pub(crate) fn rescale(point: &mut Point) {
 mod tests {
     use super::*;
     use crate::Channel;
+    use crate::chain::hysteresis::Elements;
     use crate::operators::Reading;
 
     #[test]
@@ -267,6 +268,7 @@ mod tests {
         let (inputs, outputs) = (vec![Channel::new("u", "V")], vec![Channel::new("y", "um")]);
         let record = Record::new(vec![run], 100.0, inputs, outputs, vec![]).unwrap();
         let channel = Parameters {
+            elements: Elements::Plays,
             reading: Reading::OneSided,
             thresholds: vec![0.0],
             slopes: vec![1.0],

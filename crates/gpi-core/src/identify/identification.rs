@@ -1,6 +1,7 @@
 //! What is asked of an identification, and what it answers.
 
 use crate::Model;
+use crate::chain::hysteresis::Elements;
 use crate::fit::Grid;
 use crate::fit::Refinement;
 use crate::linear::Fir;
@@ -19,6 +20,8 @@ pub struct IdentifyOptions {
     pub thresholds: Option<Grid>,
     /// The deadzone convention.
     pub reading: Reading,
+    /// Plays or stops; those that the data ask for, where none are given.
+    pub elements: Option<Elements>,
     /// Restricts the linear part to a gain with a delay of this many samples.
     pub delay: Option<usize>,
     /// As in [`RefineOptions`](crate::identify::RefineOptions).

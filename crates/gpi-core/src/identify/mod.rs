@@ -19,6 +19,7 @@ mod realization;
 mod settings;
 mod structure;
 
+pub use crate::chain::hysteresis::Elements;
 pub use crate::fit::{
     Grid, HysteresisFit, OnAnotherRecord, Parameter, RefineOptions, Refinement, Sensitivities,
     Status, fit_hysteresis, functions_of_time, on_another_record, refine,

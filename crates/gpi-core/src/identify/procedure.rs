@@ -15,14 +15,16 @@
 //! hysteresis' own output, so that no noise is run through an inverse.
 
 use crate::chain::bounds::range;
-use crate::chain::hysteresis::Parameters;
-use crate::fit::Grid;
-use crate::fit::joint::Refined;
+use crate::chain::hysteresis::{Elements, Parameters};
+use crate::chain::point::DynamicsFreedom;
+use crate::fit::joint::{Refined, fit_options};
+use crate::fit::minimize::fit;
 use crate::fit::preparation::Prepared;
+use crate::fit::{Grid, RefineOptions};
 use crate::identify::alternation::{self, Taps};
 use crate::identify::identification::{Candidate, IdentifyOptions, Round};
 use crate::identify::quasi_static;
-use crate::identify::settings::{AlternationPolicy, IdentifySettings};
+use crate::identify::settings::{AlternationPolicy, IdentifySettings, StructurePolicy};
 use crate::identify::structure::StructureSearch;
 use crate::linear::excitation_limit;
 use crate::progress::{Progress, report};
@@ -49,7 +51,69 @@ pub(crate) fn prepare<'a>(
 }
 
 /// Seeds and compares structures; `fast` rules slow poles out, and leaves the dense grid out.
+///
+/// Where nothing else is asked for, stops are compared as well if they promise more than the best plays.
 pub(super) fn compare_on_all(
+    prepared: &mut Prepared,
+    options: &IdentifyOptions,
+    fast: bool,
+    progress: Progress,
+) -> Result<Compared, Error> {
+    let plays = compare_elements(prepared, options, fast, progress)?;
+    let policy = StructurePolicy::default();
+    let cost = |found: &Compared| found.refined.fitted.linearization.cost;
+    if options.elements.is_some() || !promises_more(&plays.refined, prepared, &policy, progress)? {
+        return Ok(plays);
+    }
+    let (channels, notes) = (prepared.channels.clone(), prepared.notes.len());
+    for channel in &mut prepared.channels {
+        channel.elements = Elements::Stops;
+    }
+    let stops = Error::unless_interrupted(compare_elements(prepared, options, fast, progress))?;
+    match stops {
+        Ok(stops) if cost(&stops) < policy.of_stops * cost(&plays) => Ok(stops),
+        _ => {
+            prepared.channels = channels;
+            prepared.notes.truncate(notes);
+            Ok(plays)
+        }
+    }
+}
+
+/// Whether stops before the dynamics of plays, or before the same without their dead time, leave less than the plays.
+fn promises_more(
+    plays: &Refined,
+    prepared: &Prepared,
+    policy: &StructurePolicy,
+    progress: Progress,
+) -> Result<bool, Error> {
+    let own = &plays.fitted.point;
+    let mut options = fit_options(prepared, &RefineOptions::default(), policy.steps);
+    options.freedom.dynamics = DynamicsFreedom::Numerator;
+    options.freedom.identity = false;
+    options.gain = policy.gain;
+    let mut delays = vec![own.dynamics.delay, 0];
+    delays.dedup();
+    for delay in delays {
+        let mut point = prepared.point(own.dynamics.clone());
+        point.dynamics.delay = delay;
+        point.offsets.clone_from(&own.offsets);
+        for (channel, own) in point.channels.iter_mut().zip(&own.channels) {
+            channel.elements = Elements::Stops;
+            channel.weights[0] = own.weights.iter().sum();
+        }
+        prepared.settle(&mut point);
+        let fitted = fit(point, &prepared.record, &options, "stops", progress);
+        let Ok(fitted) = Error::unless_interrupted(fitted)? else { continue };
+        if fitted.linearization.cost < policy.of_stops * plays.fitted.linearization.cost {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Seeds and compares structures of the elements that the prepared channels have.
+fn compare_elements(
     prepared: &mut Prepared,
     options: &IdentifyOptions,
     fast: bool,
@@ -167,11 +231,12 @@ fn channels(record: &Record, options: &IdentifyOptions) -> Result<Vec<Parameters
     let half_widths = half_widths(options);
     let usual = AlternationPolicy::default().thresholds;
     let thresholds = options.thresholds.clone().unwrap_or(Grid::Count(usual));
+    let elements = options.elements.unwrap_or_default();
     let channel = |input| {
         let (low, high) = range(record, input);
         let zones = thresholds.thresholds((low, high))?;
         let plays = half_widths.half_widths(high - low)?;
-        Ok(Parameters::identity(options.reading, zones, plays))
+        Ok(Parameters { elements, ..Parameters::identity(options.reading, zones, plays) })
     };
     (0..record.inputs().len()).map(channel).collect()
 }

@@ -223,7 +223,9 @@ impl<'a> StructureSearch<'a> {
             let zones = thresholds.thresholds((low, high))?;
             let plays = half_widths.half_widths(high - low)?;
             let gain: f64 = seed.channels[input].weights.iter().sum();
-            *channel = Parameters::identity(channel.reading, zones, plays);
+            let elements = channel.elements;
+            *channel =
+                Parameters { elements, ..Parameters::identity(channel.reading, zones, plays) };
             channel.weights[0] = gain;
         }
         let mut options = fit_options(prepared, &RefineOptions::default(), policy.steps);

@@ -79,7 +79,8 @@ impl fmt::Display for OperatorError {
             Self::NotRising { parameter, index, slope } => write!(
                 f,
                 "`{parameter}`: the elements up to index {index} sum to a slope of {slope:e}, but an inverse needs \
-                 a positive slope; fit with non-negative weights and with an element at zero"
+                 a positive slope; a bank of plays needs an element at zero, and in a bank of stops a linear \
+                 part must be left when all stops slide"
             ),
             Self::Directional => f.write_str(
                 "the deadzone convention `reading` = directional maps many inputs to the same output; only one-sided \

@@ -6,6 +6,7 @@ mod rows;
 
 use crate::calls;
 use crate::errors::to_python;
+use crate::identify::elements;
 use crate::identify::grid;
 use crate::model::Refinement;
 use crate::operators::read_reading;
@@ -46,6 +47,8 @@ use pyo3::types::{PyDict, PyTuple};
 ///     Restricts G to a gain with a delay of this many samples.
 /// reading : {"one-sided", "directional"}
 ///     The deadzone convention, as in ``Deadzones``.
+/// hysteresis : {"plays", "stops"}, optional
+///     What the hysteresis consists of, as in ``identify``.
 /// progress : callable, optional
 ///     Called with a ``Progress``: the stage, the trial, the fraction done and the best error so far. An exception ends the search, as Ctrl-C does: the
 ///     effects found so far are returned, with ``interrupted`` set. Before the declared model is identified, the
@@ -70,9 +73,9 @@ use pyo3::types::{PyDict, PyTuple};
 /// (['creep'], 'explained')
 #[pyfunction]
 #[pyo3(signature = (record, holdout = None, *extra, effects = None, require = None, order = None, half_widths = None,
-    thresholds = None, delay = None, reading = "one-sided", progress = None, **others),
+    thresholds = None, delay = None, reading = "one-sided", hysteresis = None, progress = None, **others),
     text_signature = "(record, holdout=None, *, effects=None, require=None, order=None, half_widths=None, \
-thresholds=None, delay=None, reading='one-sided', progress=None)")]
+thresholds=None, delay=None, reading='one-sided', hysteresis=None, progress=None)")]
 fn explain(
     py: Python<'_>,
     record: &Bound<'_, PyAny>,
@@ -85,6 +88,7 @@ fn explain(
     thresholds: Option<&Bound<'_, PyAny>>,
     delay: Option<usize>,
     reading: &str,
+    hysteresis: Option<&str>,
     progress: Option<Py<PyAny>>,
     others: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Explanation> {
@@ -95,6 +99,7 @@ fn explain(
         half_widths: grid("half_widths", half_widths)?,
         thresholds: grid("thresholds", thresholds)?,
         reading: read_reading(reading)?,
+        elements: elements(hysteresis)?,
         ..IdentifyOptions::default()
     };
     let effects = calls::effect_names("effects", effects)?;

@@ -8,7 +8,7 @@ mod sensitivities;
 pub(crate) use grid::grid;
 
 use crate::calls;
-use crate::errors::to_python;
+use crate::errors::{parameter, to_python};
 use crate::model::{Identification, Model, Refinement};
 use crate::operators::read_reading;
 use crate::progress::interruptible;
@@ -39,6 +39,9 @@ use pyo3::types::{PyDict, PyTuple};
 ///     which are then kept fixed. When left out, their number is chosen by BIC, at most 10.
 /// reading : {"one-sided", "directional"}
 ///     The deadzone convention, as in ``Deadzones``.
+/// hysteresis : {"plays", "stops"}, optional
+///     What the hysteresis consists of: plays, whose output lags behind the input, or stops, whose output leads it, as the
+///     force of friction leads the displacement. Chosen by the data when left out.
 /// delay : int, optional
 ///     Restricts G to a gain with a delay of this many samples.
 /// robust : bool, optional
@@ -72,9 +75,9 @@ use pyo3::types::{PyDict, PyTuple};
 /// True
 #[pyfunction]
 #[pyo3(signature = (record, *extra, taps = None, order = None, half_widths = None, thresholds = None,
-    reading = "one-sided", delay = None, robust = None, offset_knots = 1, progress = None, **others),
+    reading = "one-sided", hysteresis = None, delay = None, robust = None, offset_knots = 1, progress = None, **others),
     text_signature = "(record, *, taps=None, order=None, half_widths=None, thresholds=None, \
-reading='one-sided', delay=None, robust=None, offset_knots=1, progress=None)")]
+reading='one-sided', hysteresis=None, delay=None, robust=None, offset_knots=1, progress=None)")]
 fn identify(
     py: Python<'_>,
     record: &Bound<'_, PyAny>,
@@ -84,6 +87,7 @@ fn identify(
     half_widths: Option<&Bound<'_, PyAny>>,
     thresholds: Option<&Bound<'_, PyAny>>,
     reading: &str,
+    hysteresis: Option<&str>,
     delay: Option<usize>,
     robust: Option<bool>,
     offset_knots: usize,
@@ -99,6 +103,7 @@ fn identify(
         thresholds: grid("thresholds", thresholds)?,
         reading: read_reading(reading)?,
         delay,
+        elements: elements(hysteresis)?,
         robust,
         offset_knots,
     };
@@ -109,6 +114,16 @@ fn identify(
     let refinement = Refinement::new(&model, found.refinement.clone())?;
     let refinement = Some(Py::new(py, refinement)?);
     Ok(Model { model, identification: Some(Py::new(py, Identification { found })?), refinement })
+}
+
+/// The elements of a name.
+pub(crate) fn elements(hysteresis: Option<&str>) -> PyResult<Option<core::Elements>> {
+    let known = |name: &str| match name {
+        "plays" => Ok(core::Elements::Plays),
+        "stops" => Ok(core::Elements::Stops),
+        other => Err(parameter(format!("`hysteresis` = {other}: must be plays or stops"))),
+    };
+    hysteresis.map(known).transpose()
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

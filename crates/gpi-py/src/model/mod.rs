@@ -352,14 +352,13 @@ impl Model {
     }
 
     fn __repr__(&self) -> String {
-        let plays = |h: &gpi_core::Hysteresis| {
-            format!(
-                "{} deadzones, {} plays",
-                h.envelope().weights().len(),
-                h.plays().weights().len()
-            )
+        let bank = |h: &gpi_core::Hysteresis| {
+            let (zones, plays) = (h.envelope().weights().len(), h.plays().weights());
+            let are_stops = plays.iter().any(|&weight| weight < 0.0);
+            let elements = if are_stops { "stops" } else { "plays" };
+            format!("{zones} deadzones, {} {elements}", plays.len())
         };
-        let hysteresis: Vec<String> = self.model.hysteresis().iter().map(plays).collect();
+        let hysteresis: Vec<String> = self.model.hysteresis().iter().map(bank).collect();
         format!(
             "Model({} -> {}, {}, linear order {}, {} Hz)",
             label(self.model.inputs()),
