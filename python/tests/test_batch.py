@@ -106,6 +106,15 @@ def test_a_record_that_cannot_be_read_is_a_row(records: Path, finished: tuple[Pa
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
+def test_every_file_of_a_known_ending_is_a_row(tmp_path: Path) -> None:
+    np.save(tmp_path / "u.npy", np.zeros(100))
+    (tmp_path / "notes.md").write_text("no record")
+    with ThreadPoolExecutor(1) as executor:
+        table = gpi.batch(tmp_path, out=tmp_path / "fleet", executor=executor)
+    assert table["name"].to_list() == ["u"]
+    assert "--rate" in table["error"][0]
+
+
 def test_a_pipe_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.csv")
     table = gpi.batch(tmp_path / "pipe.csv", out=tmp_path / "fleet", workers=1, **QUICK)

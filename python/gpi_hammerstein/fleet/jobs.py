@@ -17,6 +17,8 @@ from gpi_hammerstein.io.formats import FORMATS
 READ = ("input", "output", "time", "rate", "covariate", "resample", "warmup", "experiment")
 EXPLAIN = ("effects", "require", "order", "half_widths", "thresholds", "delay", "reading", "hysteresis")
 BLOCK = 1 << 20
+# A .npy file needs the option `output`; without it, its row says so.
+ENDINGS = (*FORMATS, ".npy")
 
 
 @dataclass(frozen=True)
@@ -106,13 +108,13 @@ def _files(record: Path, out: Path) -> Iterator[Path]:
         found = sorted(path for path in paths if _is_record(path, results))
     if not found:
         raise ParameterError(
-            f"`records` = {record}: no record file is there; known endings: {', '.join(FORMATS)}"
+            f"`records` = {record}: no record file is there; known endings: {', '.join(ENDINGS)}"
         )
     yield from found
 
 
 def _is_record(file: Path, results: Path) -> bool:
-    if not file.name.lower().endswith(tuple(FORMATS)) or not file.is_file():
+    if not file.name.lower().endswith(ENDINGS) or not file.is_file():
         return False
     return results not in file.resolve().parents
 
