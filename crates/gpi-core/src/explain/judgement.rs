@@ -124,6 +124,8 @@ pub(super) enum Refusal {
     ResemblesMisfit,
     /// It acts on too few occasions for a model that is far from the noise.
     TooRare,
+    /// It changes the dynamics of a stage that integrates, and the model is far from the noise.
+    Integrates,
     /// The model without it, fitted from where the trial ended, explains as much.
     LongerFit,
     /// Another effect explains as much.
@@ -156,6 +158,9 @@ impl Refusal {
             }
             Self::TooRare => {
                 "acts a few times only in this record, and the error of the model would still be far above the noise".to_owned()
+            }
+            Self::Integrates => {
+                "would change the dynamics of a stage that integrates its input, and the error of the model would still be far above the noise".to_owned()
             }
             Self::LongerFit => "reduces the error no more than a longer fit of the model without it".to_owned(),
             Self::Confounded => format!("explains as much as {taken}"),

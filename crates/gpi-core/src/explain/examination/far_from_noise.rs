@@ -13,15 +13,17 @@
 //! - effects of the output stage, such as a sensor's curve, because they depend on the position, as every misfit of the
 //!   hysteresis does;
 //! - a limit of the input's speed that the input exceeds a few times only, because such a limit explains any error of the
-//!   response to a jump, whatever its cause.
+//!   response to a jump, whatever its cause;
+//! - a loop around dynamics whose output integrates the input, because it makes up for the integrator that G lacks.
 //!
-//! Lines and measured columns are not asked, because no misfit resembles them, nor are modes, loops and shapes of loops,
-//! which may well be a large part.
+//! Lines and measured columns are not asked, because no misfit resembles them, nor are modes, other loops and shapes of
+//! hysteresis loops, which may well be a large part.
 
 use super::contribution::contribution;
 use crate::chain::point::Point;
 use crate::effects::{FreeOrder, Place, Signature};
 use crate::explain::judgement::Refusal;
+use crate::explain::outside::integrates;
 use crate::explain::state::SearchState;
 use crate::{Error, Experiment, Record};
 
@@ -38,6 +40,7 @@ pub(super) fn doubt(
         Place::Input(_)
             | Place::Widths(_)
             | Place::Parallel(_)
+            | Place::Loops(_)
             | Place::Output(_)
             | Place::Added(_)
     );
@@ -55,6 +58,9 @@ pub(super) fn doubt(
         Ok(Some(Refusal::TooRare))
     } else if matches!(of, Place::Widths(_) | Place::Output(_)) {
         Ok(Some(Refusal::ResemblesMisfit))
+    } else if let Place::Loops(_) = of {
+        let integrates = integrates(&state.prepared.record, &state.setup.policy.outside)?;
+        Ok(integrates.then_some(Refusal::Integrates))
     } else if size(state, point, place)? > policy.large {
         Ok(Some(Refusal::TooLarge))
     } else {

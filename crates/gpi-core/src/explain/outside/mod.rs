@@ -44,6 +44,15 @@ pub(super) struct Answer {
     pub notes: Vec<String>,
 }
 
+/// Whether any output integrates the input.
+pub(super) fn integrates(record: &Record, policy: &OutsidePolicy) -> Result<bool, Error> {
+    let rivals = RivalPolicy::default();
+    let scaled = Units::of(record).scaled(record)?;
+    let mut ratios = (0..scaled.outputs().len())
+        .filter_map(|output| integration::ratio(&scaled, output, &rivals, policy));
+    Ok(ratios.any(|ratio| ratio > policy.integrated))
+}
+
 /// Asks all questions.
 pub(super) fn outside(of: &Situation, policy: &OutsidePolicy) -> Result<Answer, Error> {
     let rivals = RivalPolicy::default();
