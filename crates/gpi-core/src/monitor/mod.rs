@@ -195,7 +195,7 @@ impl Monitor {
             let largest = own.largest_misfit().get(output).copied().unwrap_or(0.0);
             largest.max(self.settings.unseen * own.misfit()[output])
         });
-        (self.settings.hidden * self.noise[output]).powi(2) + misfit.powi(2)
+        (self.settings.unseen * self.settings.hidden * self.noise[output]).powi(2) + misfit.powi(2)
     }
 
     /// Length of a block, in samples: tests are made at the end of each.
