@@ -12,9 +12,11 @@ settings! {
         samples: usize = 100, FROM_ONE;
         /// The smallest part by which the noise must have changed: its size in the training record is itself uncertain.
         least_noise: f64 = 0.1, PART;
-        /// The part of the noise that a slow error of the model may have although the training record does not show it: its
-        /// mean autocovariance over L lags of N samples is then two standard errors at N L = 640,000. On other data it is larger by `unseen`, as the misfit that shows.
-        hidden: f64 = 0.05, PART;
+        /// The part of the noise that an error of the model may have although the training record does not show it: its
+        /// mean autocovariance over 10 lags, the most that the misfit is sought in, is then two standard errors of that of
+        /// 12,000 samples of noise, `sqrt(2 / sqrt(120,000))`. On other data it is larger by `unseen`, as the misfit that
+        /// shows.
+        hidden: f64 = 0.075, PART;
         /// The smallest root mean square of a new line as a part of the noise, because the training record may contain weaker
         /// lines that are not in the model; and the part of the model's own motion at a frequency that counts as the motion's.
         least_line: f64 = 0.3, PART;
