@@ -1,0 +1,44 @@
+"""What measured records of known physics must and must not be said to lack."""
+
+from pathlib import Path
+
+import pytest
+
+import gpi_hammerstein as gpi
+from data_folder import MEASURED, needs_measured
+
+pytestmark = [pytest.mark.slow, needs_measured]
+
+
+def explained(file: str, **columns: object) -> dict[str, object]:
+    return gpi.explain(gpi.read_record(Path(MEASURED) / file, **columns)).to_dict()
+
+
+def held_out(answer) -> float:
+    return answer["error"]["after"]["holdout"]["rms"]
+
+
+def best_rival(answer) -> float:
+    return min(rival["holdout_rms"] for rival in answer["rivals"])
+
+
+@pytest.mark.parametrize("columns", [{}, {"covariate": []}], ids=["with the reference", "without"])
+def test_friction_of_an_integrating_stage_is_no_effect_of_the_catalogue(columns):
+    answer = explained("emps/emps_train.csv.gz", input="motor_V", output="position_m", **columns)
+    assert answer["effects"] == [] and answer["verdict"] == "outside-class"
+    assert "integrates the input" in answer["verdict_reason"]
+
+
+def test_a_friction_damper_is_a_bank_of_stops():
+    options = {"input": "displacement_in", "output": "force_kip", "covariate": []}
+    for file, most in (("0.5Hz_30lb", 1.05), ("1Hz_20lb", 1.0)):
+        answer = explained(f"friction-damper/{file}.csv.gz", **options)
+        assert answer["effects"] == []
+        assert held_out(answer) <= most * best_rival(answer)
+
+
+def test_the_stiffness_of_an_oscillator_is_named():
+    for file in ("silverbox/train", "bouc-wen/train_multisine"):
+        answer = explained(f"{file}.csv.gz")
+        assert answer["effects"] == ["stiffness"]
+        assert held_out(answer) < best_rival(answer)
