@@ -95,7 +95,7 @@ pub(super) struct SearchState<'a> {
     pub before_lags: Option<BeforeLags>,
     /// What was added.
     pub additions: Vec<Addition>,
-    /// The models before each addition, as long as the poles of G may come back that they have.
+    /// The models before each addition. Emptied when poles are taken out of G, because these models still have them.
     pub left: Vec<Point>,
     /// Isolated wrong samples, `[experiment][output]`.
     pub wrong: Vec<Vec<Vec<usize>>>,

@@ -13,9 +13,9 @@ settings! {
         /// The smallest part by which the noise must have changed: its size in the training record is itself uncertain.
         least_noise: f64 = 0.1, PART;
         /// The part of the noise that an error of the model may have although the training record does not show it: its
-        /// mean autocovariance over 10 lags, the most that the misfit is sought in, is then two standard errors of that of
-        /// 12,000 samples of noise, `sqrt(2 / sqrt(120,000))`. On other data it is larger by `unseen`, as the misfit that
-        /// shows.
+        /// mean autocovariance over 10 lags (the largest number of lags that the misfit is computed from) is then two standard
+        /// errors of the same mean of 12,000 samples of noise: `sqrt(2 / sqrt(120,000))`. On other data, the error is larger by
+        /// the factor `unseen`, like a misfit that shows. Chosen on the machines of `tools/monitor_figures.py --seed 100`.
         hidden: f64 = 0.075, PART;
         /// The smallest root mean square of a new line as a part of the noise, because the training record may contain weaker
         /// lines that are not in the model; and the part of the model's own motion at a frequency that counts as the motion's.
