@@ -140,18 +140,21 @@ impl Monitor {
 
     /// The limits of the tests: ``noise``, the standard deviation of each output's noise, in the output's unit; ``deviations``,
     /// the standard errors (a pure number) that a change must exceed in each of two windows; ``least_noise``, the smallest
-    /// change of the noise that counts, a fraction of it; ``known``, the mean square of each output's error that is always known to
-    /// be possible, in the square of the output's unit; ``block``, a count: the samples between two tests.
+    /// change of the noise that counts, a fraction of it; ``misfit``, the root mean square of the error of each output that may have
+    /// any shape, in the output's unit; ``hidden``, that of a slow error that the training record may hide, in the output's
+    /// unit; ``block``, a count: the samples between two tests.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let own = &self.monitor;
-        let known: Vec<f64> =
-            (0..own.noise().len()).map(|output| own.always_known(output)).collect();
+        let outputs = 0..own.noise().len();
+        let misfit: Vec<f64> = outputs.clone().map(|output| own.misfit(output)).collect();
+        let hidden: Vec<f64> = outputs.map(|output| own.hidden(output)).collect();
         let dict = PyDict::new(py);
         dict.set_item("noise", own.noise().to_vec())?;
         dict.set_item("deviations", own.deviations())?;
         dict.set_item("least_noise", own.least_noise())?;
-        dict.set_item("known", known)?;
+        dict.set_item("misfit", misfit)?;
+        dict.set_item("hidden", hidden)?;
         dict.set_item("block", own.block())?;
         Ok(dict)
     }

@@ -219,7 +219,7 @@ mod tests {
                 let offset = if block >= 40 { 0.3 } else { 0.0 };
                 let gain = if block >= 70 { -0.2 } else { 0.0 };
                 let noise = 0.1 * (12.9898 * t * t).sin();
-                sums.add(&phi, offset + gain * phi[1] + noise, 0.0);
+                sums.add(&phi, &[], offset + gain * phi[1] + noise, 0.0);
             }
             history.push(&sums);
         }
@@ -244,7 +244,7 @@ mod tests {
             for k in 0..50 {
                 let t = f64::from(50 * block + k);
                 let size = if block >= 45 { 0.2 } else { 0.1 };
-                sums.add(&[1.0, (0.11 * t).sin()], size * (12.9898 * t * t).sin(), 0.0);
+                sums.add(&[1.0, (0.11 * t).sin()], &[], size * (12.9898 * t * t).sin(), 0.0);
             }
             history.push(&sums);
         }

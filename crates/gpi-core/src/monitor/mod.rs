@@ -16,6 +16,7 @@
 //! The rate of false alarms is bounded by the sum over all tests, which each have the same probability. The windows double in
 //! length, so that a block needs two tests for each quantity on average.
 
+mod drawn;
 mod history;
 mod lines;
 mod moved;
@@ -25,11 +26,13 @@ mod watch;
 
 pub use moved::Watched;
 
+use crate::operators::{Limits, POSSIBLE};
 use crate::{Error, Matrix, Model};
+use drawn::drawn_models;
 use lines::{Line, Lines};
 use moved::moved_models;
 use settings::MonitorSettings;
-use statrs::distribution::{ContinuousCDF, Normal};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use tracks::Tracks;
 use watch::{Found, Watch};
 
@@ -90,6 +93,7 @@ pub struct Monitor {
     /// What is tested in the order of the regressors, and models in which it has changed.
     watched: Vec<Watched>,
     neighbours: Vec<Model>,
+    draws: Vec<(Model, f64)>,
     deviations: f64,
     /// Samples until a transient of the dynamics has decayed, and those that have to decay still.
     memory: usize,
@@ -138,11 +142,28 @@ impl Monitor {
             [Watched::Offset, Watched::Gain].into_iter().chain(moved).collect();
         // two directions of each quantity and of the noise, on two levels of windows on average, and as much for lines
         let tests = 8.0 * (watched.len() + 1) as f64;
-        let deviations = Normal::standard().inverse_cdf(1.0 - (rate / tests).sqrt());
+        let chance = (rate / tests).sqrt();
+        let deviations = Normal::standard().inverse_cdf(1.0 - chance);
+        let draws = drawn_models(&driven, &settings);
+        // the variance is an estimate from as many draws
+        let of_draws = StudentsT::new(0.0, 1.0, draws.len() as f64)
+            .map_or(0.0, |student| student.inverse_cdf(1.0 - chance));
+        // a resonance oscillates within a block; a slower one looks like a change of the state
+        let is_fast = |own: &Watched| matches!(own, Watched::Resonance { frequency } if frequency * block as f64 >= model.rate());
+        let fast = (watched.iter().enumerate()).filter(|(_, own)| is_fast(own));
+        let fast = fast.fold(0, |bits, (place, _)| bits | 1 << place);
         let frame = settings.frame * block;
         let of_lines = 0.5 * rate * settings.frame as f64;
         let tests_of = |&noise: &f64| {
-            let watch = Watch::new(noise, watched.len(), deviations, &settings)?;
+            let limits = Limits {
+                noise,
+                deviations,
+                least_noise: settings.least_noise,
+                hidden: settings.hidden * noise,
+                fast,
+                of_draws,
+            };
+            let watch = Watch::new(limits, watched.len(), draws.len(), &settings)?;
             Ok::<_, Error>((watch, Lines::new(frame, noise, of_lines, &settings)))
         };
         let radius = driven.linear().spectral_radius()?;
@@ -162,6 +183,7 @@ impl Monitor {
             block,
             watched,
             neighbours,
+            draws,
             deviations,
             tracks: None,
             samples: 0,
@@ -188,14 +210,18 @@ impl Monitor {
         self.settings.least_noise
     }
 
-    /// The mean square of the error of an output that is always known to be possible, in its unit squared: what the training
-    /// record may hide, and the misfit: twice that of the whole record, or that of its worst second.
-    pub fn always_known(&self, output: usize) -> f64 {
-        let misfit = self.model.prediction().map_or(0.0, |own| {
+    /// The error of an output that may have any shape, in its unit: twice the misfit of the whole training record, or the misfit
+    /// of its worst second.
+    pub fn misfit(&self, output: usize) -> f64 {
+        self.model.prediction().map_or(0.0, |own| {
             let largest = own.largest_misfit().get(output).copied().unwrap_or(0.0);
             largest.max(self.settings.unseen * own.misfit()[output])
-        });
-        (self.settings.unseen * self.settings.hidden * self.noise[output]).powi(2) + misfit.powi(2)
+        })
+    }
+
+    /// The slow error of an output that the training record may hide, in its unit.
+    pub fn hidden(&self, output: usize) -> f64 {
+        self.settings.hidden * self.noise[output]
     }
 
     /// Length of a block, in samples: tests are made at the end of each.
@@ -263,7 +289,8 @@ impl Monitor {
             let rows = |signal: &Matrix| signal.rows(first, count).into_owned();
             if self.tracks.is_none() {
                 self.tracks = Some(Tracks::new(
-                    (&self.model, &self.driven, &self.neighbours),
+                    (&self.model, &self.driven),
+                    (&self.neighbours, &self.draws),
                     &self.settings,
                     input,
                     covariates,
@@ -284,8 +311,10 @@ impl Monitor {
         let simulated = tracks.run(input, covariates, &forgotten)?;
         let of_time = tracks.of_time.clone();
         let mut regressors = vec![1.0; self.watched.len()];
+        let mut draws = vec![0.0; self.draws.len()];
         let constants: Vec<f64> =
-            (0..self.noise.len()).map(|o| self.always_known(o) + of_time[o]).collect();
+            (0..self.noise.len()).map(|o| self.misfit(o).powi(2) + of_time[o]).collect();
+        let hidden: Vec<f64> = (0..self.noise.len()).map(|o| self.hidden(o).powi(2)).collect();
         for (place, (watch, lines)) in self.outputs.iter_mut().enumerate() {
             let constant = constants[place];
             let offset = self.model.offsets()[place];
@@ -293,13 +322,21 @@ impl Monitor {
                 let predicted = simulated.predicted[(k, place)];
                 regressors[1] = predicted - offset;
                 let derivatives = simulated.derivatives.iter().map(|own| own[(k, place)]);
-                regressors[2..].iter_mut().zip(derivatives).for_each(|(to, from)| *to = from);
-                let known = constant + simulated.parameters[(k, place)];
+                // at rest, a derivative that has decayed is rounding, which would look like an offset
+                let least = forgotten[place];
+                let counted = derivatives.map(|own| if own.abs() < least { 0.0 } else { own });
+                regressors[2..].iter_mut().zip(counted).for_each(|(to, from)| *to = from);
+                draws
+                    .iter_mut()
+                    .zip(&simulated.draws)
+                    .for_each(|(to, from)| *to = from[(k, place)]);
                 let start = simulated.start[(k, place)];
                 let is_counted = k >= self.waiting;
                 let residual = if is_counted { output[(k, place)] - predicted } else { f64::NAN };
-                watch.add(&regressors, residual, known, start);
-                lines.add(residual, predicted, known + start)?;
+                watch.add((&regressors, &draws), residual, constant, start);
+                let drawn = POSSIBLE * draws.iter().map(|draw| draw * draw).sum::<f64>();
+                let possible = constant + start + drawn + hidden[place];
+                lines.add(residual, predicted, possible)?;
             }
         }
         self.waiting = self.waiting.saturating_sub(input.nrows());

@@ -27,8 +27,8 @@ pub(super) struct Outputs {
     pub predicted: Matrix,
     /// Of each neighbour, the output's derivative by its relative change.
     pub derivatives: Vec<Matrix>,
-    /// Mean square of the output's differences that uncertain parameters make possible.
-    pub parameters: Matrix,
+    /// Draws of the output's differences that uncertain parameters make possible; their squares add up to the variance.
+    pub draws: Vec<Matrix>,
     /// The largest square of the differences that the unknown start makes possible.
     pub start: Matrix,
 }
@@ -43,7 +43,6 @@ pub(super) struct Tracks {
     draws: Vec<(Track, f64)>,
     /// The machine may have stood at the ends of its range, or at zero, until just before the first sample.
     starts: Vec<Track>,
-    deviations: f64,
     /// Mean square of each output's part that only depends on the time of the training record, which is unknown here.
     pub of_time: Vec<f64>,
 }
@@ -51,9 +50,10 @@ pub(super) struct Tracks {
 impl Tracks {
     /// For a first run of samples (samples, inputs): the machine has stood at the first one. `driven` is the model without
     /// the effects that are functions of the time of its training record; `neighbours` are models in which one quantity
-    /// has moved.
+    /// has moved, `draws` those of `drawn_models`.
     pub(super) fn new(
-        (model, driven, neighbours): (&Model, &Model, &[Model]),
+        (model, driven): (&Model, &Model),
+        (neighbours, draws): (&[Model], &[(Model, f64)]),
         settings: &MonitorSettings,
         input: &Matrix,
         covariates: &Matrix,
@@ -67,9 +67,8 @@ impl Tracks {
         };
         let first = row(|first, _| first);
         let moved = neighbours.iter().map(|neighbour| Track::standing(neighbour, &first));
-        let draws = (0..settings.draws)
-            .filter_map(|draw| drawn(model, draw))
-            .map(|(neighbour, factor)| Ok((Track::standing(&neighbour, &first)?, factor)));
+        let draws = (draws.iter())
+            .map(|(neighbour, factor)| Ok((Track::standing(neighbour, &first)?, *factor)));
         let ends = [row(|low, u| low.min(u).min(0.0)), row(|high, u| high.max(u).max(0.0))];
         Ok(Self {
             model: Track::standing(model, &first)?,
@@ -80,7 +79,6 @@ impl Tracks {
                 .iter()
                 .map(|end| Track::standing(model, end))
                 .collect::<Result<_, Error>>()?,
-            deviations: settings.deviations,
             of_time,
         })
     }
@@ -99,12 +97,11 @@ impl Tracks {
             Ok::<_, Error>((track.outputs(input, covariates)? - &predicted) / step)
         };
         let derivatives = self.moved.iter_mut().map(derivative).collect::<Result<_, _>>()?;
-        let mut parameters = Matrix::zeros(predicted.nrows(), predicted.ncols());
-        let share = self.deviations.powi(2) / self.draws.len().max(1) as f64;
-        for (track, factor) in &mut self.draws {
-            let difference = track.outputs(input, covariates)? - &predicted;
-            parameters += difference.map(|d| share * (d * *factor).powi(2));
-        }
+        let share = (self.draws.len() as f64).sqrt().recip();
+        let draw = |(track, factor): &mut (Track, f64)| {
+            Ok::<_, Error>((track.outputs(input, covariates)? - &predicted) * (*factor * share))
+        };
+        let draws = self.draws.iter_mut().map(draw).collect::<Result<_, _>>()?;
         let mut lasting = Vec::new();
         let mut start = Matrix::zeros(predicted.nrows(), predicted.ncols());
         for mut track in self.starts.drain(..) {
@@ -117,39 +114,6 @@ impl Tracks {
             start.zip_apply(&difference, |most, d| *most = most.max(d * d));
         }
         self.starts = lasting;
-        Ok(Outputs { predicted, derivatives, parameters, start })
+        Ok(Outputs { predicted, derivatives, draws, start })
     }
-}
-
-/// A model of the uncertain parameters, a small step from the model so that it is valid, and the factor from this step to one
-/// draw; `None` without a covariance, or if no step is valid.
-///
-/// With axes d_k of the covariance and signs s_k, `sum_k s_k d_k` has this covariance over all signs (M. F. Hutchinson,
-/// *A stochastic estimator of the trace*, 1990).
-fn drawn(model: &Model, draw: usize) -> Option<(Model, f64)> {
-    let prediction = model.prediction()?;
-    let numbers = model.numbers();
-    let mut change = vec![0.0; numbers.len()];
-    for (axis, parts) in prediction.axes.iter().enumerate() {
-        let sign = if hash(draw, axis) & 1 == 0 { 1.0 } else { -1.0 };
-        for (&place, &part) in prediction.numbers.iter().zip(parts) {
-            change[place] += sign * f64::from(part);
-        }
-    }
-    // a whole draw may leave the valid models: poles beyond the unit circle, half-widths below zero
-    [0.1, -0.1, 0.01, -0.01, 1e-3, -1e-3].into_iter().find_map(|step| {
-        let there: Vec<f64> = numbers.iter().zip(&change).map(|(n, d)| n + step * d).collect();
-        let neighbour = model.with_numbers(&there).ok()?;
-        let stable = neighbour.linear().spectral_radius().ok()? < 1.0;
-        stable.then_some((neighbour, 1.0 / step))
-    })
-}
-
-/// Bits that look random (G. Steele and others, *Fast splittable pseudorandom number generators*, 2014).
-fn hash(draw: usize, axis: usize) -> u64 {
-    let mut z = (draw as u64) << 32 | axis as u64;
-    z = z.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }

@@ -46,15 +46,15 @@ pub(super) struct Found {
 }
 
 impl Watch {
-    /// For noise of a standard deviation, `count` possible changes, and the deviations that count.
+    /// For `count` possible changes and as many draws of the error, with these limits.
     pub(super) fn new(
-        noise: f64,
+        limits: Limits<f64>,
         count: usize,
-        deviations: f64,
+        draws: usize,
         settings: &MonitorSettings,
     ) -> Result<Self, Error> {
-        let products = vec![0.0; (count + 1) * (count + 2) / 2];
-        let limits = Limits { noise, deviations, least_noise: settings.least_noise };
+        let products = vec![0.0; Moments::<Vec<f64>>::length(count, draws)];
+        let noise = limits.noise;
         let monitor = ResidualMonitor::new(limits, &products, count, 1)?;
         let empty = Moments::like(&products);
         Ok(Self {
@@ -73,12 +73,18 @@ impl Watch {
         })
     }
 
-    /// Counts one sample; one that is not finite is left out. `start` is the mean square of the error that the unknown start
-    /// makes possible, and `known` that of all others.
+    /// Counts one sample with the draws of its error; one that is not finite is left out. `start` is the square of the error
+    /// that the unknown start makes possible, and `known` that of all others.
     #[inline]
-    pub(super) fn add(&mut self, regressors: &[f64], residual: f64, known: f64, start: f64) {
+    pub(super) fn add(
+        &mut self,
+        (regressors, draws): (&[f64], &[f64]),
+        residual: f64,
+        known: f64,
+        start: f64,
+    ) {
         if residual.is_finite() {
-            self.block.add(regressors, residual, known + start);
+            self.block.add(regressors, draws, residual, known + start);
             self.is_settled &= start <= known + self.noise * self.noise;
         }
     }

@@ -21,6 +21,8 @@ pub use deadzones::{Deadzones, DeadzonesState, Reading};
 pub use error::OperatorError;
 pub use inverse::{Compensator, CompensatorState, Curve, Faults, InverseGpi, InverseState};
 pub use lags::{Lags, LagsState};
+#[cfg(feature = "identify")]
+pub(crate) use monitor::POSSIBLE;
 pub use monitor::{
     Agreed, Limits, Merge, Moments, Regression, ResidualMonitor, ResidualMonitorState, Windows,
 };

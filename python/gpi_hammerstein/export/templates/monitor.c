@@ -10,9 +10,10 @@ typedef ${model}_real real;
 typedef ${name}_sums sums;
 
 /* Standard deviation of the noise, standard errors that a change must exceed, the smallest part by which the noise
-   must have changed, and the mean square of the error that is known to be possible. */
+   must have changed, the error of any shape that is known to be possible, and the slow error that the training record may hide. */
 static const double noise = $noise, deviations = $deviations, least_noise = $least_noise;
-static const real known = $known, model_offset = $model_offset;
+static const double misfit = $misfit, hidden = $hidden;
+static const real model_offset = $model_offset;
 
 /* A pivot below this part of its regressor's own sum is rounding. */
 #define DEPENDENT 1e-6
@@ -22,7 +23,7 @@ static const real known = $known, model_offset = $model_offset;
 
 /* One of two windows that follow each other. */
 typedef struct {
-    double own[6], swept[6], noise, known, samples;
+    double own[6], swept[6], noise, samples;
 } side;
 
 static int is_finite(real value)
@@ -94,7 +95,6 @@ static side side_of(const sums *window)
     for (i = 0; i < 6; ++i)
         one.own[i] = one.swept[i] = window->products[i];
     one.samples = window->samples;
-    one.known = root(window->known);
     enter(&one, 0);
     enter(&one, 1);
     one.noise = root(left(&one) / one.samples);
@@ -108,12 +108,15 @@ static side side_of(const sums *window)
 /* The standard errors by which a change exceeds what is possible without it, with the sign of the change. */
 static double excess(const side *one, int i, int is_in)
 {
-    double product = one->swept[place(i, 2)], information = one->swept[place(i, i)], deviation, more;
+    double product = one->swept[place(i, 2)], information = one->swept[place(i, i)], deviation, beyond, more;
     if (!is_in && !can_enter(one, i))
         return 0;
     deviation = product / root(is_in ? -information : information);
-    more = ((deviation < 0 ? -deviation : deviation) - one->known) / one->noise;
-    return more <= 0 ? 0 : deviation < 0 ? -more : more;
+    beyond = (deviation < 0 ? -deviation : deviation) - misfit * root(one->samples);
+    if (beyond <= 0)
+        return 0;
+    more = root(beyond * beyond - hidden * hidden * one->samples) / one->noise;
+    return deviation < 0 ? -more : more;
 }
 
 /* The sum of squares that a change outside the regression would explain. */
@@ -139,7 +142,8 @@ static double common(const side *a, const side *b, int i, int is_in)
 static int way_of_noise(const side *one, double explained)
 {
     double variance = noise * noise * one->samples, chance = deviations * root(2 / one->samples);
-    if ((left(one) - one->known * one->known - explained) / variance - 1 > (2 + least_noise) * least_noise + chance)
+    double possible = (misfit * misfit + hidden * hidden) * one->samples;
+    if ((left(one) - possible - explained) / variance - 1 > (2 + least_noise) * least_noise + chance)
         return 1;
     return left(one) / variance - 1 < -(2 - least_noise) * least_noise - chance ? -1 : 0;
 }
@@ -209,7 +213,6 @@ static unsigned end_block(${name}_state *state)
         for (i = 0; i < 6; ++i)
             sum.products[i] += earlier.products[i];
         sum.samples += earlier.samples;
-        sum.known += earlier.known;
     }
     state->changed |= found;
     return found;
@@ -246,7 +249,6 @@ unsigned ${name}_step(${name}_state *state, const real *input, real output)
                 state->current.products[place(i, j)] += values[i] * values[j];
         }
         state->current.samples += 1;
-        state->current.known += known;
     }
     if (++state->samples < $block)
         return 0;

@@ -16,10 +16,9 @@ $facts
 #define ${NAME}_NOISE_ROSE 4u
 #define ${NAME}_NOISE_FELL 8u
 
-/* Sums over a window: of the products of 1, the movement of the model and the residual, of the samples, and of the
-   square of the error that is known to be possible. */
+/* Sums over a window: of the products of 1, the movement of the model and the residual, and of the samples. */
 typedef struct {
-    ${model}_real products[6], samples, known;
+    ${model}_real products[6], samples;
 } ${name}_sums;
 
 /* The state of the monitor between two samples. */

@@ -7,6 +7,9 @@ use crate::operators::{Sample, Storage};
 /// order leaves of it must not be taken for another one: at this part, the second order is a third of the first.
 const REMAINDER: f64 = 0.1;
 
+/// The square of the standard deviations by which draws of the error may be exceeded in the sum of its squares.
+pub(crate) const POSSIBLE: f64 = 4.0;
+
 /// When a change counts.
 ///
 /// A change is noticed if it deviates from zero by more than `deviations` standard errors in each of two successive windows,
@@ -14,9 +17,17 @@ const REMAINDER: f64 = 0.1;
 /// the probability `2 (1 - Phi(z))^2` for one change; [`Limits::deviations`] follows from the rate of false alarms by
 /// summation over all windows and changes.
 ///
-/// An error m that is known to be possible (what the model leaves, its uncertain parameters, the unknown start) may take
+/// An error m that is known to be possible, such as the misfit of the training record and the unknown start, may take
 /// any shape. By the inequality of Cauchy and Schwarz it moves an estimate by at most `sqrt(sum m^2)` standard errors for
-/// noise of deviation 1, so that this much more is needed.
+/// noise of deviation 1. An error h that changes as slowly as the state of the machine moves only estimates of changes that are
+/// slow themselves. Errors of which draws are known move an estimate as the draws do. The last two are independent of
+/// the noise. A deviation d from zero counts if
+///
+/// ```text
+/// (|d| - sqrt(sum m^2))^2 > (z s)^2 + N h^2 [slow] + t^2 sum_j d_j^2
+/// ```
+///
+/// with the deviation d_j of each draw and the quantile t of as many degrees of freedom as there are draws.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits<T> {
     /// Standard deviation s of the noise when the model was made.
@@ -25,6 +36,12 @@ pub struct Limits<T> {
     pub deviations: T,
     /// The smallest part by which the noise must have changed, such as 0.1.
     pub least_noise: T,
+    /// The slow error h that the training record may hide although it is there.
+    pub hidden: T,
+    /// Bit i is set if regressor i changes its sign while the machine stays in one state, as that of a resonance.
+    pub fast: u32,
+    /// The quantile t of the draws of the error, zero without draws.
+    pub of_draws: T,
 }
 
 /// What two windows agree upon.
@@ -56,6 +73,10 @@ struct Side<S: Storage> {
     regression: Regression<S>,
     noise: f64,
     known: f64,
+    hidden: f64,
+    drawn: f64,
+    of_draws: f64,
+    fast: u32,
     samples: f64,
 }
 
@@ -72,7 +93,11 @@ impl<S: Storage> Side<S> {
         Self {
             regression: moments.regression(count),
             noise: if present > noise { present } else { noise },
-            known: square_root(moments.known.into()),
+            known: moments.known.into(),
+            hidden: square(limits.hidden) * samples,
+            drawn: moments.drawn.into(),
+            of_draws: square(limits.of_draws),
+            fast: limits.fast,
             samples,
         }
     }
@@ -91,8 +116,15 @@ impl<S: Storage> Side<S> {
     fn excess(&self, regressor: usize, is_in: bool) -> f64 {
         let deviation = self.regression.deviation(regressor, is_in);
         let size = if deviation < 0.0 { -deviation } else { deviation };
-        let more = (size - self.known) / self.noise;
-        if more <= 0.0 { 0.0 } else { more * if deviation < 0.0 { -1.0 } else { 1.0 } }
+        let beyond = size - square_root(self.known);
+        if beyond <= 0.0 {
+            return 0.0;
+        }
+        let is_fast = self.fast >> regressor & 1 == 1;
+        let hidden = if is_fast { 0.0 } else { self.hidden };
+        let drawn = self.of_draws * self.regression.drawn(regressor, is_in);
+        let more = square_root(beyond * beyond - hidden - drawn) / self.noise;
+        if deviation < 0.0 { -more } else { more }
     }
 }
 
@@ -152,7 +184,8 @@ impl<T: Sample> Limits<T> {
             let variance = noise * noise * side.samples;
             let chance = deviations * square_root(2.0 / side.samples);
             let left = side.regression_left();
-            let risen = (left - side.known * side.known - explained) / variance - 1.0;
+            let possible = side.known + side.hidden + POSSIBLE * side.drawn;
+            let risen = (left - possible - explained) / variance - 1.0;
             let fallen = left / variance - 1.0;
             if risen > (2.0 + part) * part + chance {
                 1
@@ -165,6 +198,10 @@ impl<T: Sample> Limits<T> {
         let (one, two) = (way(&sides[0]), way(&sides[1]));
         if one == two { one } else { 0 }
     }
+}
+
+fn square<T: Sample>(value: T) -> f64 {
+    value.into() * value.into()
 }
 
 fn f64_of<T: Sample>(value: T) -> f64 {
@@ -189,7 +226,14 @@ fn larger(best: (usize, f64), next: (usize, f64)) -> (usize, f64) {
 mod tests {
     use super::*;
 
-    const LIMITS: Limits<f64> = Limits { noise: 0.1, deviations: 4.0, least_noise: 0.1 };
+    const LIMITS: Limits<f64> = Limits {
+        noise: 0.1,
+        deviations: 4.0,
+        least_noise: 0.1,
+        hidden: 0.0,
+        fast: 0,
+        of_draws: 0.0,
+    };
 
     struct Noise(u64);
 
@@ -215,7 +259,7 @@ mod tests {
                 let phi = [1.0, (0.05 * f64::from(k)).sin()];
                 let wrong = if window == 1 && k == 250 { spike } else { 0.0 };
                 let r = changes[0] * phi[0] + changes[1] * phi[1] + noise * random.next() + wrong;
-                sums.add(&phi, r, known * known);
+                sums.add(&phi, &[], r, known * known);
             }
             sums
         })
@@ -248,6 +292,14 @@ mod tests {
     fn an_error_that_is_known_to_be_possible_is_no_change() {
         assert_eq!(agreed([0.05, 0.0], 0.1, 0.0, 0.05).changes, 0);
         assert_eq!(agreed([0.1, 0.0], 0.1, 0.0, 0.05).changes, 0b01);
+    }
+
+    #[test]
+    fn a_hidden_error_is_no_slow_change() {
+        let [earlier, later] = windows([0.04, -0.06], 0.1, 0.0, 0.0);
+        let limits = Limits { hidden: 0.06, fast: 0b10, ..LIMITS };
+        assert_eq!(LIMITS.agreed(&earlier, &later, 2).changes, 0b11);
+        assert_eq!(limits.agreed(&earlier, &later, 2).changes, 0b10);
     }
 
     #[test]

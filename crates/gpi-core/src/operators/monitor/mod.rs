@@ -9,6 +9,8 @@ mod moments;
 mod residual;
 mod windows;
 
+#[cfg(feature = "identify")]
+pub(crate) use judge::POSSIBLE;
 pub use judge::{Agreed, Limits};
 pub use moments::{Moments, Regression};
 pub use residual::{ResidualMonitor, ResidualMonitorState};

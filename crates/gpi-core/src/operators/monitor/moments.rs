@@ -3,6 +3,9 @@
 //! Let r be the residual, `phi_1 .. phi_n` what it would contain per unit of each possible change, and
 //! `r(k) = sum_i d_i phi_i(k) + m(k) + w(k)` with white noise w of standard deviation s and an error m that is known to be
 //! possible. The sums `sum_k phi_i phi_j`, `sum_k phi_i r` and `sum_k r^2` of a window are all that least squares needs.
+//!
+//! Errors of which samples are known, such as those that uncertain parameters cause, are draws `e_1 .. e_D` whose squares add
+//! up to the variance. The sums `sum_k phi_i e_j` tell what each of them does to an estimate.
 //! The sweep operator (J. H. Goodnight, *A tutorial on the SWEEP operator*, The American Statistician 33, 1979) takes one
 //! regressor after the other into the regression, in place, and out again.
 
@@ -13,31 +16,48 @@ const DEPENDENT: f64 = 1e-6;
 
 /// Sums over a window of samples.
 ///
-/// `S` holds the upper triangle of the products of `phi_1 .. phi_n, r`, row by row: `(n + 1)(n + 2) / 2` numbers, an
-/// array on firmware.
+/// `S` holds for each i the products of `phi_i` with `phi_i .. phi_n, e_1 .. e_D, r`, row by row, and at last that of r with
+/// itself: [`Moments::length`] numbers, an array on firmware.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moments<S: Storage> {
     products: S,
     /// Number of samples.
     pub samples: S::Item,
-    /// `sum_k m(k)^2`, the square sum of the error that is known to be possible.
+    /// `sum_k m(k)^2`, the square sum of an error that may have any shape.
     pub known: S::Item,
+    /// `sum_k sum_j e_j(k)^2`.
+    pub drawn: S::Item,
 }
 
 impl<S: Storage> Moments<S> {
     /// Empty sums, in the storage of `products`.
     pub fn like(products: &S) -> Self {
         let zero = S::Item::ZERO;
-        Self { products: products.filled(zero), samples: zero, known: zero }
+        Self { products: products.filled(zero), samples: zero, known: zero, drawn: zero }
     }
 
-    /// Counts one sample: what each change would add to the residual, the residual, and `m(k)^2`.
+    /// The number of products of n regressors and D draws: `n (n + 1) / 2 + n (D + 1) + 1`.
+    pub const fn length(regressors: usize, draws: usize) -> usize {
+        regressors * (regressors + 1) / 2 + regressors * (draws + 1) + 1
+    }
+
+    /// Counts one sample: what each change would add to the residual, the draws of the error, the residual, and `m(k)^2`.
     #[inline]
-    pub fn add(&mut self, regressors: &[S::Item], residual: S::Item, known: S::Item) {
+    pub fn add(
+        &mut self,
+        regressors: &[S::Item],
+        draws: &[S::Item],
+        residual: S::Item,
+        known: S::Item,
+    ) {
         let values = self.products.values_mut();
         let mut place = 0;
         for (i, &left) in regressors.iter().enumerate() {
             for &right in &regressors[i..] {
+                values[place] = values[place] + left * right;
+                place += 1;
+            }
+            for &right in draws {
                 values[place] = values[place] + left * right;
                 place += 1;
             }
@@ -47,6 +67,7 @@ impl<S: Storage> Moments<S> {
         values[place] = values[place] + residual * residual;
         self.samples = self.samples + S::Item::ONE;
         self.known = self.known + known;
+        draws.iter().for_each(|&draw| self.drawn = self.drawn + draw * draw);
     }
 
     /// The sums of two windows together.
@@ -57,6 +78,7 @@ impl<S: Storage> Moments<S> {
         pairs.for_each(|(sum, &value)| *sum = *sum + value);
         both.samples = both.samples + other.samples;
         both.known = both.known + other.known;
+        both.drawn = both.drawn + other.drawn;
         both
     }
 
@@ -68,6 +90,7 @@ impl<S: Storage> Moments<S> {
         pairs.for_each(|(sum, &value)| *sum = *sum - value);
         rest.samples = rest.samples - part.samples;
         rest.known = rest.known - part.known;
+        rest.drawn = rest.drawn - part.drawn;
         rest
     }
 
@@ -75,9 +98,10 @@ impl<S: Storage> Moments<S> {
     #[must_use]
     pub fn with_only(&self, count: usize, is_there: impl Fn(usize) -> bool) -> Self {
         let mut sums = self.clone();
+        let columns = self.columns(count);
         let mut place = 0;
-        for i in 0..=count {
-            for j in i..=count {
+        for i in 0..count {
+            for j in i..columns {
                 if [i, j].into_iter().any(|i| i < count && !is_there(i)) {
                     sums.products.values_mut()[place] = S::Item::ZERO;
                 }
@@ -89,7 +113,14 @@ impl<S: Storage> Moments<S> {
 
     /// The regression of the residual on no regressor yet; `count` is the number n of regressors.
     pub fn regression(&self, count: usize) -> Regression<S> {
-        Regression { swept: self.products.clone(), own: self.products.clone(), size: count + 1 }
+        let columns = self.columns(count);
+        Regression { swept: self.products.clone(), own: self.products.clone(), count, columns }
+    }
+
+    /// The number of regressors, draws and the residual together.
+    fn columns(&self, count: usize) -> usize {
+        let rows = self.products.values().len() - 1;
+        if count == 0 { 1 } else { (rows + count * (count - 1) / 2) / count }
     }
 }
 
@@ -98,13 +129,22 @@ impl<S: Storage> Moments<S> {
 pub struct Regression<S: Storage> {
     swept: S,
     own: S,
-    size: usize,
+    count: usize,
+    columns: usize,
 }
 
 impl<S: Storage> Regression<S> {
     fn place(&self, i: usize, j: usize) -> usize {
         let (low, high) = if i < j { (i, j) } else { (j, i) };
-        low * (2 * self.size - low - 1) / 2 + high
+        if low >= self.count {
+            return self.swept.values().len() - 1;
+        }
+        low * (2 * self.columns - low - 1) / 2 + high
+    }
+
+    /// The column of the residual.
+    fn residual(&self) -> usize {
+        self.columns - 1
     }
 
     fn at(&self, i: usize, j: usize) -> S::Item {
@@ -131,17 +171,15 @@ impl<S: Storage> Regression<S> {
     /// Replaces the pivot d by `-1 / d`, its row by `sign row / d`, and the rest by the Schur complement; `sign` is 1 to
     /// enter, and -1 to leave.
     fn sweep(&mut self, k: usize, pivot: S::Item, sign: S::Item) {
-        for i in 0..self.size {
-            for j in i..self.size {
-                if i != k && j != k {
-                    let place = self.place(i, j);
-                    let less = self.at(i, k) * self.at(k, j) / pivot;
-                    let value = self.swept.values()[place] - less;
-                    self.swept.values_mut()[place] = value;
-                }
-            }
+        let residual = self.residual();
+        let rows = (0..self.count).flat_map(|i| (i..self.columns).map(move |j| (i, j)));
+        for (i, j) in rows.chain([(residual, residual)]).filter(|&(i, j)| i != k && j != k) {
+            let place = self.place(i, j);
+            let less = self.at(i, k) * self.at(k, j) / pivot;
+            let value = self.swept.values()[place] - less;
+            self.swept.values_mut()[place] = value;
         }
-        for i in (0..self.size).filter(|&i| i != k) {
+        for i in (0..self.columns).filter(|&i| i != k) {
             let place = self.place(i, k);
             let value = sign * self.swept.values()[place] / pivot;
             self.swept.values_mut()[place] = value;
@@ -152,26 +190,40 @@ impl<S: Storage> Regression<S> {
 
     /// The estimated change of a regressor that is in the regression.
     pub fn change(&self, regressor: usize) -> S::Item {
-        self.at(regressor, self.size - 1)
+        self.at(regressor, self.residual())
     }
 
     /// The sum of squares that the regression leaves.
     pub fn left(&self) -> S::Item {
-        self.at(self.size - 1, self.size - 1).at_least(S::Item::ZERO)
+        self.at(self.residual(), self.residual()).at_least(S::Item::ZERO)
     }
 
     /// The change of one regressor over its standard error for noise of deviation 1, with its sign: of one that is in the
     /// regression, or would enter it; zero if it cannot enter.
     pub fn deviation(&self, regressor: usize, is_in: bool) -> f64 {
-        let (product, information) = (self.change(regressor), self.at(regressor, regressor));
+        self.standard_error(regressor, is_in)
+            .map_or(0.0, |root| self.change(regressor).into() / root)
+    }
+
+    /// The variance of this deviation by the draws of the error.
+    pub fn drawn(&self, regressor: usize, is_in: bool) -> f64 {
+        let Some(root) = self.standard_error(regressor, is_in) else { return 0.0 };
+        let of = |draw: usize| {
+            let deviation = self.at(regressor, draw).into() / root;
+            deviation * deviation
+        };
+        (self.count..self.residual()).map(of).sum()
+    }
+
+    /// The number by which a product with the residual is divided for a deviation.
+    fn standard_error(&self, regressor: usize, is_in: bool) -> Option<f64> {
+        let information = self.at(regressor, regressor);
         if is_in {
-            return product.into() / square_root((-information).into());
+            return Some(square_root((-information).into()));
         }
         let own = self.own.values()[self.place(regressor, regressor)];
-        if information.into() <= DEPENDENT * own.into() || information <= S::Item::ZERO {
-            return 0.0;
-        }
-        product.into() / square_root(information.into())
+        let can_enter = information > S::Item::ZERO && information.into() > DEPENDENT * own.into();
+        can_enter.then(|| square_root(information.into()))
     }
 }
 
@@ -197,7 +249,7 @@ mod tests {
         for k in 0..200 {
             let t = f64::from(k);
             let phi = [1.0, (0.3 * t).sin(), (0.3 * t).sin() + 0.1 * (0.9 * t).cos()];
-            sums.add(&phi, 0.5 * phi[0] - 2.0 * phi[2], 0.01);
+            sums.add(&phi, &[], 0.5 * phi[0] - 2.0 * phi[2], 0.01);
         }
         sums
     }
@@ -231,10 +283,35 @@ mod tests {
     #[test]
     fn a_dependent_regressor_does_not_enter() {
         let mut sums = Moments::like(&[0.0; 6]);
-        (0..50).for_each(|k| sums.add(&[1.0, 3.0], f64::from(k), 0.0));
+        (0..50).for_each(|k| sums.add(&[1.0, 3.0], &[], f64::from(k), 0.0));
         let mut regression = sums.regression(2);
         assert!(regression.enter(0) && !regression.enter(1));
         assert_eq!(regression.deviation(1, false), 0.0);
+    }
+
+    #[test]
+    fn a_draw_does_what_a_residual_of_its_shape_would_do() {
+        let mut sums = Moments::like(&[0.0; Moments::<[f64; 1]>::length(2, 1)]);
+        for k in 0..300 {
+            let t = f64::from(k);
+            let phi = [1.0, (0.3 * t).sin()];
+            let error = 0.3 + 0.2 * (0.29 * t).sin();
+            sums.add(&phi, &[error], error, 0.0);
+        }
+        let mut regression = sums.regression(2);
+        let agree = |regression: &Regression<_>, i, is_in| {
+            let (own, drawn) = (regression.deviation(i, is_in), regression.drawn(i, is_in));
+            assert!((own * own / drawn - 1.0).abs() < 1e-9, "{i}: {own} {drawn}");
+        };
+        agree(&regression, 0, false);
+        regression.enter(0);
+        agree(&regression, 0, true);
+        agree(&regression, 1, false);
+        let only = sums.with_only(2, |i| i == 1).regression(2);
+        assert_eq!(
+            [only.drawn(0, false), only.drawn(1, false)],
+            [0.0, sums.regression(2).drawn(1, false)]
+        );
     }
 
     #[test]

@@ -16,7 +16,9 @@ impl<S: Storage> Merge for Moments<S> {
 ///
 /// ```
 /// use gpi_core::operators::{Limits, ResidualMonitor};
-/// let limits = Limits { noise: 0.01, deviations: 4.0, least_noise: 0.1 };
+/// let limits = Limits {
+///     noise: 0.01, deviations: 4.0, least_noise: 0.1, hidden: 0.004, fast: 0, of_draws: 0.0,
+/// };
 /// // two changes: six products
 /// let monitor = ResidualMonitor::<[f64; 6], 16>::new(limits, &[0.0; 6], 2, 100)?;
 /// let mut state = monitor.rest();
@@ -25,7 +27,7 @@ impl<S: Storage> Merge for Moments<S> {
 ///     let t = f64::from(k);
 ///     let predicted = (0.05 * t).sin();
 ///     let measured = predicted * if k < 1000 { 1.0 } else { 1.02 } + 0.014 * (7.1 * t * t).sin();
-///     if let Some(agreed) = monitor.step(&mut state, &[1.0, predicted], measured - predicted, 0.0) {
+///     if let Some(agreed) = monitor.step(&mut state, &[1.0, predicted], &[], measured - predicted, 0.0) {
 ///         found.get_or_insert((k, agreed));
 ///     }
 /// }
@@ -38,6 +40,7 @@ pub struct ResidualMonitor<S: Storage, const LEVELS: usize> {
     limits: Limits<S::Item>,
     empty: Moments<S>,
     changes: usize,
+    draws: usize,
     block: u32,
 }
 
@@ -52,7 +55,8 @@ pub struct ResidualMonitorState<S: Storage, const LEVELS: usize> {
 impl<S: Storage, const LEVELS: usize> ResidualMonitor<S, LEVELS> {
     /// A monitor of `changes` possible changes, with blocks of `block` samples.
     ///
-    /// `products` is the storage for sums of products, whose values do not count: `(changes + 1)(changes + 2) / 2` numbers.
+    /// `products` is the storage for sums of products, whose values do not count: [`Moments::length`] numbers for as many draws
+    /// of the error as [`ResidualMonitor::step`] is to get.
     /// The longest window has `2^LEVELS` blocks.
     ///
     /// # Errors
@@ -64,11 +68,17 @@ impl<S: Storage, const LEVELS: usize> ResidualMonitor<S, LEVELS> {
         block: u32,
     ) -> Result<Self, OperatorError> {
         let all = changes.min(32);
-        require_length("products", products.values().len(), (all + 1) * (all + 2) / 2)?;
-        let Limits { noise, deviations, least_noise } = limits;
-        for (name, value) in
-            [("noise", noise), ("deviations", deviations), ("least_noise", least_noise)]
-        {
+        let (given, least) = (products.values().len(), Moments::<S>::length(all, 0));
+        let draws = if all == 0 { 0 } else { given.saturating_sub(least) / all };
+        require_length("products", given, Moments::<S>::length(all, draws))?;
+        let Limits { noise, deviations, least_noise, hidden, of_draws, .. } = limits;
+        for (name, value) in [
+            ("noise", noise),
+            ("deviations", deviations),
+            ("least_noise", least_noise),
+            ("hidden", hidden),
+            ("of_draws", of_draws),
+        ] {
             require_finite(name, &[value])?;
             require_not_negative(name, &[value])?;
         }
@@ -76,7 +86,7 @@ impl<S: Storage, const LEVELS: usize> ResidualMonitor<S, LEVELS> {
             let parameter = if block == 0 { "block" } else { "noise" };
             return Err(OperatorError::Zero { parameter });
         }
-        Ok(Self { limits, empty: Moments::like(products), changes, block })
+        Ok(Self { limits, empty: Moments::like(products), changes, draws, block })
     }
 
     /// The limits.
@@ -93,8 +103,8 @@ impl<S: Storage, const LEVELS: usize> ResidualMonitor<S, LEVELS> {
         }
     }
 
-    /// Counts one sample: what each possible change would add to the residual, the residual (measured minus predicted), and
-    /// the square of the error that is known to be possible. A sample that is not finite is left out.
+    /// Counts one sample: what each possible change would add to the residual, the draws of the error, the residual (measured
+    /// minus predicted), and the square of the error that may have any shape. A sample that is not finite is left out.
     ///
     /// At the end of a block, the changes upon which two successive windows agree, of all lengths that end here: those of
     /// the windows with most evidence.
@@ -103,12 +113,14 @@ impl<S: Storage, const LEVELS: usize> ResidualMonitor<S, LEVELS> {
         &self,
         state: &mut ResidualMonitorState<S, LEVELS>,
         regressors: &[S::Item],
+        draws: &[S::Item],
         residual: S::Item,
         known: S::Item,
     ) -> Option<Agreed> {
-        let regressors = &regressors[..self.changes.min(regressors.len())];
-        if residual.finite() && known.finite() && regressors.iter().all(|value| value.finite()) {
-            state.current.add(regressors, residual, known);
+        let are_all = regressors.len() == self.changes && draws.len() == self.draws;
+        let mut values = regressors.iter().chain(draws);
+        if are_all && residual.finite() && known.finite() && values.all(|value| value.finite()) {
+            state.current.add(regressors, draws, residual, known);
         }
         state.samples += 1;
         if state.samples < self.block {
