@@ -149,6 +149,18 @@ def test_wrong_and_missing_samples_are_no_change(model):
     assert not monitor.changed, monitor.changes
 
 
+def test_a_slow_error_that_the_training_record_may_hide_is_no_change(model):
+    u = np.r_[drive(3, 60), np.full(12_000, 4.0)]
+    y = stage(u) + noise(4, len(u))
+    for error in (0.3, 1.0):
+        monitor = gpi.Monitor(model)
+        monitor.push(u, y + error * NOISE * (np.arange(len(u)) >= 6000))
+        assert monitor.changed == (error == 1.0), monitor.changes
+    # at rest, other changes cannot be told from an offset
+    (change,) = monitor.changes
+    assert "offset" in [change["what"], *change["instead"]]
+
+
 def test_an_unknown_start_is_no_change(model):
     u = np.r_[np.full(500, 10.0), drive(3, 120)]
     y = stage(u) + noise(4, len(u))
