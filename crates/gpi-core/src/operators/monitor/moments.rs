@@ -120,7 +120,7 @@ impl<S: Storage> Moments<S> {
     /// The number of regressors, draws and the residual together.
     fn columns(&self, count: usize) -> usize {
         let rows = self.products.values().len() - 1;
-        if count == 0 { 1 } else { (rows + count * (count - 1) / 2) / count }
+        (rows + count * count.saturating_sub(1) / 2).checked_div(count).unwrap_or(1)
     }
 }
 

@@ -69,7 +69,7 @@ impl<S: Storage, const LEVELS: usize> ResidualMonitor<S, LEVELS> {
     ) -> Result<Self, OperatorError> {
         let all = changes.min(32);
         let (given, least) = (products.values().len(), Moments::<S>::length(all, 0));
-        let draws = if all == 0 { 0 } else { given.saturating_sub(least) / all };
+        let draws = given.saturating_sub(least).checked_div(all).unwrap_or(0);
         require_length("products", given, Moments::<S>::length(all, draws))?;
         let Limits { noise, deviations, least_noise, hidden, of_draws, .. } = limits;
         for (name, value) in [
