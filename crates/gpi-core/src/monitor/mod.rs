@@ -149,7 +149,10 @@ impl Monitor {
         let of_draws = StudentsT::new(0.0, 1.0, draws.len() as f64)
             .map_or(0.0, |student| student.inverse_cdf(1.0 - chance));
         // a resonance oscillates within a block; a slower one looks like a change of the state
-        let is_fast = |own: &Watched| matches!(own, Watched::Resonance { frequency } if frequency * block as f64 >= model.rate());
+        let is_fast = |own: &Watched| match own {
+            Watched::Resonance { frequency } => frequency * block as f64 >= model.rate(),
+            _ => false,
+        };
         let fast = (watched.iter().enumerate()).filter(|(_, own)| is_fast(own));
         let fast = fast.fold(0, |bits, (place, _)| bits | 1 << place);
         let frame = settings.frame * block;

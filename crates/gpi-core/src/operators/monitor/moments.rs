@@ -3,11 +3,11 @@
 //! Let r be the residual, `phi_1 .. phi_n` what it would contain per unit of each possible change, and
 //! `r(k) = sum_i d_i phi_i(k) + m(k) + w(k)` with white noise w of standard deviation s and an error m that is known to be
 //! possible. The sums `sum_k phi_i phi_j`, `sum_k phi_i r` and `sum_k r^2` of a window are all that least squares needs.
+//! The sweep operator (J. H. Goodnight, *A tutorial on the SWEEP operator*, The American Statistician 33, 1979) takes one
+//! regressor after the other into the regression, in place, and out again.
 //!
 //! Errors of which samples are known, such as those that uncertain parameters cause, are draws `e_1 .. e_D` whose squares add
 //! up to the variance. The sums `sum_k phi_i e_j` tell what each of them does to an estimate.
-//! The sweep operator (J. H. Goodnight, *A tutorial on the SWEEP operator*, The American Statistician 33, 1979) takes one
-//! regressor after the other into the regression, in place, and out again.
 
 use crate::operators::{Sample, Storage};
 
@@ -201,22 +201,22 @@ impl<S: Storage> Regression<S> {
     /// The change of one regressor over its standard error for noise of deviation 1, with its sign: of one that is in the
     /// regression, or would enter it; zero if it cannot enter.
     pub fn deviation(&self, regressor: usize, is_in: bool) -> f64 {
-        self.standard_error(regressor, is_in)
-            .map_or(0.0, |root| self.change(regressor).into() / root)
+        self.divisor(regressor, is_in)
+            .map_or(0.0, |divisor| self.change(regressor).into() / divisor)
     }
 
     /// The variance of this deviation by the draws of the error.
     pub fn drawn(&self, regressor: usize, is_in: bool) -> f64 {
-        let Some(root) = self.standard_error(regressor, is_in) else { return 0.0 };
+        let Some(divisor) = self.divisor(regressor, is_in) else { return 0.0 };
         let of = |draw: usize| {
-            let deviation = self.at(regressor, draw).into() / root;
+            let deviation = self.at(regressor, draw).into() / divisor;
             deviation * deviation
         };
         (self.count..self.residual()).map(of).sum()
     }
 
-    /// The number by which a product with the residual is divided for a deviation.
-    fn standard_error(&self, regressor: usize, is_in: bool) -> Option<f64> {
+    /// What a product of the regressor, with the residual or a draw, is divided by for a deviation.
+    fn divisor(&self, regressor: usize, is_in: bool) -> Option<f64> {
         let information = self.at(regressor, regressor);
         if is_in {
             return Some(square_root((-information).into()));

@@ -68,6 +68,7 @@ impl<S: Storage, const LEVELS: usize> ResidualMonitor<S, LEVELS> {
         block: u32,
     ) -> Result<Self, OperatorError> {
         let all = changes.min(32);
+        require_length("changes", changes, all)?;
         let (given, least) = (products.values().len(), Moments::<S>::length(all, 0));
         let draws = given.saturating_sub(least).checked_div(all).unwrap_or(0);
         require_length("products", given, Moments::<S>::length(all, draws))?;
@@ -104,7 +105,8 @@ impl<S: Storage, const LEVELS: usize> ResidualMonitor<S, LEVELS> {
     }
 
     /// Counts one sample: what each possible change would add to the residual, the draws of the error, the residual (measured
-    /// minus predicted), and the square of the error that may have any shape. A sample that is not finite is left out.
+    /// minus predicted), and the square of the error that may have any shape. A sample that is not finite, or that has another
+    /// number of changes or draws than the monitor, is left out.
     ///
     /// At the end of a block, the changes upon which two successive windows agree, of all lengths that end here: those of
     /// the windows with most evidence.
