@@ -49,8 +49,8 @@ fn axes_of(
 
 impl Model {
     /// The model with what the [`Refinement`] that led to it on `record` knows about its errors; without it, where the
-    /// covariance cannot be expressed by the numbers of the model or is not finite. That is a numerical weakness, of which
-    /// [`Model::prediction`] tells, and no error.
+    /// covariance cannot be expressed by the numbers of the model or is not finite, or where a loop of the model diverges from
+    /// rest. That is a numerical weakness, of which [`Model::prediction`] tells, and no error.
     ///
     /// ```
     /// use gpi_core::identify::{Grid, IdentifyOptions, identify};
@@ -80,7 +80,11 @@ impl Model {
         let known = ("refinement", refinement.residuals.len());
         Error::require_equal("experiments", experiments, known)?;
         let Ok((numbers, axes)) = axes_of(&self, refinement, record) else { return Ok(self) };
-        let Misfit { misfit, movement, largest_misfit } = Misfit::of(&self, refinement, record)?;
+        let Misfit { misfit, movement, largest_misfit } =
+            match Misfit::of(&self, refinement, record) {
+                Err(Error::Diverged { .. }) => return Ok(self),
+                known => known?,
+            };
         let prediction = Prediction { numbers, axes, misfit, movement, largest_misfit };
         self.prediction = prediction.is_finite().then_some(prediction);
         Ok(self)
