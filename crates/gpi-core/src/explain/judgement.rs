@@ -126,6 +126,10 @@ pub(super) enum Refusal {
     TooRare,
     /// It changes the dynamics of a stage that integrates, and the model is far from the noise.
     Integrates,
+    /// It is a function of time whose knots are closer than a time constant of the dynamics.
+    AsFastAsLags,
+    /// It is a spring inside a mechanical loop, and the dynamics have no resonance.
+    NoResonance,
     /// The model without it, fitted from where the trial ended, explains as much.
     LongerFit,
     /// Another effect explains as much.
@@ -162,6 +166,10 @@ impl Refusal {
             Self::Integrates => {
                 "would change the dynamics of a stage that integrates its input, and the error of the model would still be far above the noise".to_owned()
             }
+            Self::AsFastAsLags => {
+                "is a function of time that changes as fast as the dynamics, and may follow what they lack".to_owned()
+            }
+            Self::NoResonance => "would act inside a mechanical loop, and the dynamics have no resonance".to_owned(),
             Self::LongerFit => "reduces the error no more than a longer fit of the model without it".to_owned(),
             Self::Confounded => format!("explains as much as {taken}"),
             Self::Inferior => format!("explains less than {taken}"),

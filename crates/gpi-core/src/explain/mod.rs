@@ -43,7 +43,7 @@ use crate::fit::joint::{Refined, fit_options};
 use crate::fit::preparation::starts_at_rest;
 use crate::identify::long_record::compare;
 use crate::identify::procedure::prepare;
-use crate::identify::{Grid, IdentifyOptions, Progress, Refinement, Report};
+use crate::identify::{Grid, IdentifyOptions, Progress, Quick, Refinement, Report};
 use crate::progress::{Overall, ProgressSettings};
 use crate::spectrum::is_one_sine;
 use crate::uncertainty::outliers;
@@ -102,6 +102,8 @@ pub fn explain(
     record.require_moving()?;
     let training = blocks::hold_out(record, &policy.holdout)?;
     let identify = usual_grids(&options.identify, &training, &policy.grid);
+    let fewer = [&options.identify.half_widths, &options.identify.thresholds].map(Option::is_none);
+    let quick = Quick { fewer };
     // spikes of the output itself
     let outputs: Vec<Matrix> = training.experiments().iter().map(|e| e.output.clone()).collect();
     let spikes = outliers::places(&outputs, &repair::everything(&training)?, 0);
@@ -111,7 +113,7 @@ pub fn explain(
     let mut prepared = prepare(&training, &identify)?;
     let measured = as_measured(&prepared.record, record, &prepared.means)?;
     let mut progress = |report: &Report| overall.take(report);
-    let mut refined = compare(&mut prepared, &identify, true, &mut progress)?.refined;
+    let mut refined = compare(&mut prepared, &identify, Some(quick), &mut progress)?.refined;
     refined.drop_undetermined(&prepared, &mut progress)?;
     let order_is_given = identify.order.is_some() || identify.delay.is_some();
     // none at all is a grid too

@@ -109,7 +109,8 @@ pub(super) fn shed_lags(state: &mut SearchState, progress: Progress) -> Result<b
         return Ok(false);
     }
     let memory = Memory::of(&state.prepared.record);
-    let Some(point) = state.point.without(|pole| memory.is_slow_lag(pole))? else {
+    let lags = memory.slow_lags(&state.point.dynamics);
+    let Some(point) = state.point.without(|pole| lags.iter().any(|lag| is_same(lag, pole)))? else {
         return Ok(false);
     };
     let fitted = state.fit(point, &state.setup.options, "slow poles", progress)?;

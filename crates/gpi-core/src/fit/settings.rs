@@ -180,6 +180,9 @@ settings! {
     struct MemorySettings {
         /// Part of the longest experiment: a slower pole follows a disturbance. By hand.
         part: f64 = 0.05, PART;
+        /// Part of the DC gain that is there at once, at least, where a slow lag is creep: the gains of creep add up to about one
+        /// at most, so that half of the gain is there at once. By hand, with a margin.
+        at_once: f64 = 0.25, PART;
     }
 
     /// Which modes of G are examined for following a line, and the lines that are tried.

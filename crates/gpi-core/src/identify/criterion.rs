@@ -18,6 +18,7 @@
 
 use crate::Error;
 use crate::chain::point::Point;
+use crate::chain::table::Table;
 use crate::effects::longest_lag;
 use crate::fit::RefineOptions;
 use crate::fit::joint::{Refined, joint};
@@ -36,6 +37,8 @@ struct Tried {
     refined: Refined,
     /// Samples of white noise that a parameter takes from its residual.
     samples: f64,
+    /// `N ln e^2 + c p ln N`, whether it is usable or not.
+    criterion: f64,
     /// `N ln w^2 + p ln N`, w the innovations of its residual.
     whitened: f64,
     /// Poles that rule it out: they follow creep, a disturbance or a line of the mains instead of the input.
@@ -117,9 +120,7 @@ impl<'a> Comparison<'a> {
     }
 
     fn refine(&mut self, point: Point, progress: Progress) -> Result<bool, Error> {
-        let usable = self.refined.iter().filter(|tried| tried.is_usable());
-        let costs = usable.map(|tried| tried.refined.fitted.linearization.cost);
-        let hopeless = self.policy.hopeless * costs.fold(f64::INFINITY, f64::min);
+        let hopeless = self.hopeless(&point);
         let refined = joint(point, self.prepared, &self.options, hopeless, self.fast, progress)?;
         // a model of it must exist
         refined.fitted.point.dynamics.to_state_space()?;
@@ -141,21 +142,46 @@ impl<'a> Comparison<'a> {
         let samples = (uncertainty.used / parameters.max(1) as f64).max(1.0);
         let unwanted = self.unwanted(point)?;
         let whitened = self.whitened(point, parameters)?;
-        self.refined.push(Tried { refined, samples, whitened, unwanted });
+        self.refined.push(Tried { refined, samples, criterion: 0.0, whitened, unwanted });
         self.compare();
-        Ok(self.chosen() == Some(self.candidates.len() - 1))
+        let last = self.candidates.len() - 1;
+        Ok(self.chosen() == Some(last) && self.refined[last].is_usable())
+    }
+
+    /// The cost with which a point is given up after a few steps: where fewer parameters do not make up for it.
+    fn hopeless(&self, point: &Point) -> f64 {
+        let Some(best) = self.chosen().filter(|&place| self.refined[place].is_usable()) else {
+            return f64::INFINITY;
+        };
+        let count = |point: &Point| {
+            Table::new(point, self.refined[best].refined.options.freedom).len as f64
+        };
+        let fewer = (count(self.refined[best].point()) - count(point)).max(0.0);
+        let values = self.prepared.values();
+        let saved = self.samples() * fewer * values.ln() / values;
+        self.policy.hopeless * saved.exp() * self.refined[best].refined.fitted.linearization.cost
+    }
+
+    /// Samples of white noise that a parameter takes from the smallest residual.
+    fn samples(&self) -> f64 {
+        self.closest().map_or(1.0, |place| self.refined[place].samples)
+    }
+
+    /// Whether the best candidate has so many parameters that much simpler ones may be better.
+    pub(super) fn is_crowded(&self) -> bool {
+        let parameters = self.chosen().map(|place| self.candidates[place].parameters as f64);
+        parameters.is_some_and(|count| self.policy.crowded * count > self.prepared.values())
     }
 
     /// Works the criteria out, with the autocorrelation of the smallest residual.
     fn compare(&mut self) {
         let values = self.prepared.values();
-        let samples = self.closest().map_or(1.0, |place| self.refined[place].samples);
-        for (candidate, tried) in self.candidates.iter_mut().zip(&self.refined) {
+        let samples = self.samples();
+        for (candidate, tried) in self.candidates.iter_mut().zip(&mut self.refined) {
             let deviance = 2.0 * values * candidate.rms.max(f64::MIN_POSITIVE).ln();
             candidate.used = samples * candidate.parameters as f64;
-            let penalty =
-                if tried.is_usable() { candidate.used * values.ln() } else { f64::INFINITY };
-            candidate.criterion = deviance + penalty;
+            tried.criterion = deviance + candidate.used * values.ln();
+            candidate.criterion = if tried.is_usable() { tried.criterion } else { f64::INFINITY };
         }
     }
 
@@ -218,8 +244,7 @@ impl<'a> Comparison<'a> {
         let mut unwanted = line_modes(point, &self.prepared.record)?;
         if self.fast {
             let memory = Memory::of(&self.prepared.record);
-            let poles = point.dynamics.poles();
-            unwanted.extend(poles.into_iter().filter(|pole| memory.is_exceeded_by(pole)));
+            unwanted.extend(memory.exceeded_by(&point.dynamics));
         }
         Ok(unwanted)
     }
@@ -230,11 +255,13 @@ impl<'a> Comparison<'a> {
         (0..self.candidates.len()).min_by(|&i, &j| rms(i).total_cmp(&rms(j)))
     }
 
-    /// The place of the best candidate.
+    /// The place of the best candidate, usable if any is.
     fn chosen(&self) -> Option<usize> {
-        let criterion = |i: usize| self.candidates[i].criterion;
         let places = 0..self.candidates.len();
-        let best = places.clone().min_by(|&i, &j| criterion(i).total_cmp(&criterion(j)))?;
+        let of_all = |i: &usize| !self.has_usable() || self.refined[*i].is_usable();
+        let criterion = |i: usize| self.refined[i].criterion;
+        let usable = places.clone().filter(of_all);
+        let best = usable.min_by(|&i, &j| criterion(i).total_cmp(&criterion(j)))?;
         let own = &self.candidates[best];
         let is_rival = |&place: &usize| {
             let other = &self.candidates[place];

@@ -25,7 +25,7 @@ pub fn identify(
     let ProgressSettings { light, structures, identified, last, .. } = ProgressSettings::usual()?;
     let mut overall = Overall::new(progress, light, identified, structures);
     let mut prepared = prepare(record, options)?;
-    let found = compare(&mut prepared, options, false, &mut |report| overall.take(report))?;
+    let found = compare(&mut prepared, options, None, &mut |report| overall.take(report))?;
     overall.part(1.0, last * light);
     let found = finish(&prepared, found, &mut |report| overall.take(report))?;
     overall.finish();
@@ -38,7 +38,7 @@ fn finish(
     found: Compared,
     progress: Progress,
 ) -> Result<Identification, Error> {
-    let Compared { chosen, mut refined, candidates, quasi_static, stages, supported } = found;
+    let Compared { chosen, mut refined, candidates, quasi_static, stages, supported, .. } = found;
     let ((taps, singular_values, reflected, rounds), supported_taps) = (stages, supported);
     refined.drop_undetermined(prepared, progress)?;
     let refinement = refined.finish(prepared, progress)?;

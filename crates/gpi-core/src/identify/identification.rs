@@ -30,6 +30,14 @@ pub struct IdentifyOptions {
     pub offset_knots: usize,
 }
 
+/// For a search for effects, which refines the model later: slow poles are ruled out, the dense grid is left out, and grids
+/// are those of the options.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Quick {
+    /// Whether there may be fewer plays and deadzones than that where the samples are few.
+    pub fewer: [bool; 2],
+}
+
 /// One structure that was refined and compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {

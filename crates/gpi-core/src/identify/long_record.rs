@@ -7,34 +7,34 @@ use crate::chain::point::Point;
 use crate::fit::excerpt::excerpt;
 use crate::fit::joint::joint;
 use crate::fit::preparation::Prepared;
-use crate::identify::identification::IdentifyOptions;
+use crate::identify::identification::{IdentifyOptions, Quick};
 use crate::identify::procedure::{Compared, compare_on_all, prepare};
 use crate::identify::structure::refine_options;
 use crate::progress::Progress;
 
-/// Seeds and compares structures; `fast` rules slow poles out, and leaves the dense grid out.
+/// Seeds and compares structures.
 ///
 /// Those of a long record are compared on stretches of it, and the best one is fitted to all of it.
 pub(crate) fn compare(
     prepared: &mut Prepared,
     options: &IdentifyOptions,
-    fast: bool,
+    quick: Option<Quick>,
     progress: Progress,
 ) -> Result<Compared, Error> {
     let Some(stretches) = excerpt(prepared.given, &prepared.settings.excerpt)? else {
-        return compare_on_all(prepared, options, fast, progress);
+        return compare_on_all(prepared, options, quick, progress);
     };
     let compared = prepare(&stretches, options).and_then(|mut part| {
-        compare_on_all(&mut part, options, fast, progress).map(|compared| (part, compared))
+        compare_on_all(&mut part, options, quick, progress).map(|compared| (part, compared))
     });
     // stretches that show too little, such as an impulse response of rank 0, leave the whole record to try
     let Ok((part, mut compared)) = Error::unless_interrupted(compared)? else {
-        return compare_on_all(prepared, options, fast, progress);
+        return compare_on_all(prepared, options, quick, progress);
     };
     let point = carried(&compared.refined.fitted.point, &part, prepared);
     let refine = refine_options(options);
     prepared.settings = prepared.settings.clone().of_long_record();
-    compared.refined = joint(point, prepared, &refine, f64::INFINITY, fast, progress)?;
+    compared.refined = joint(point, prepared, &refine, f64::INFINITY, quick.is_some(), progress)?;
     prepared.notes.push(format!(
         "the structures were compared on {} of {} samples, in stretches that are spread over the record; the best one was \
          then fitted to all samples",
@@ -97,7 +97,7 @@ mod tests {
             prepared.settings.excerpt.long = long;
             prepared.settings.excerpt.samples = 6000;
             prepared.settings.excerpt.shortest = 1500;
-            let compared = compare(&mut prepared, &options, false, &mut |_| true).unwrap();
+            let compared = compare(&mut prepared, &options, None, &mut |_| true).unwrap();
             let is_told = prepared.notes.iter().any(|note| note.contains("were compared on"));
             (compared.refined.fitted, is_told)
         };

@@ -28,4 +28,5 @@ pub use crate::fit::{
 pub use crate::progress::{Progress, Report};
 pub use crate::uncertainty::{Bands, NoiseFloor, NoiseMethod, PoleDeviations, ResponseDeviation};
 pub use entry::identify;
+pub(crate) use identification::Quick;
 pub use identification::{Candidate, Identification, IdentifyOptions, Round};

@@ -22,7 +22,7 @@ use crate::fit::minimize::fit;
 use crate::fit::preparation::Prepared;
 use crate::fit::{Grid, RefineOptions};
 use crate::identify::alternation::{self, Taps};
-use crate::identify::identification::{Candidate, IdentifyOptions, Round};
+use crate::identify::identification::{Candidate, IdentifyOptions, Quick, Round};
 use crate::identify::quasi_static;
 use crate::identify::settings::{AlternationPolicy, IdentifySettings, StructurePolicy};
 use crate::identify::structure::StructureSearch;
@@ -36,6 +36,8 @@ pub(crate) struct Compared {
     pub chosen: usize,
     pub refined: Refined,
     pub candidates: Vec<Candidate>,
+    /// Whether the samples are few for the parameters of the best candidate.
+    is_crowded: bool,
     pub(super) quasi_static: bool,
     pub(super) stages: (Option<usize>, Vec<f64>, usize, Vec<Round>),
     pub(super) supported: usize,
@@ -50,34 +52,53 @@ pub(crate) fn prepare<'a>(
     Prepared::new(record, channels(record, options)?)
 }
 
-/// Seeds and compares structures; `fast` rules slow poles out, and leaves the dense grid out.
+/// Seeds and compares structures.
 ///
 /// Where nothing else is asked for, stops are compared as well if they promise more than the best plays.
 pub(super) fn compare_on_all(
     prepared: &mut Prepared,
     options: &IdentifyOptions,
-    fast: bool,
+    quick: Option<Quick>,
     progress: Progress,
 ) -> Result<Compared, Error> {
-    let plays = compare_elements(prepared, options, fast, progress)?;
+    let plays = compare_elements(prepared, options, quick, progress)?;
     let policy = StructurePolicy::default();
-    let cost = |found: &Compared| found.refined.fitted.linearization.cost;
-    if options.elements.is_some() || !promises_more(&plays.refined, prepared, &policy, progress)? {
+    if options.elements.is_some()
+        || !plays.is_crowded && !promises_more(&plays.refined, prepared, &policy, progress)?
+    {
         return Ok(plays);
     }
     let (channels, notes) = (prepared.channels.clone(), prepared.notes.len());
     for channel in &mut prepared.channels {
         channel.elements = Elements::Stops;
     }
-    let stops = Error::unless_interrupted(compare_elements(prepared, options, fast, progress))?;
+    let stops = Error::unless_interrupted(compare_elements(prepared, options, quick, progress))?;
     match stops {
-        Ok(stops) if cost(&stops) < policy.of_stops * cost(&plays) => Ok(stops),
+        Ok(stops) if are_better(&stops, &plays, prepared, &policy) => Ok(stops),
         _ => {
             prepared.channels = channels;
             prepared.notes.truncate(notes);
             Ok(plays)
         }
     }
+}
+
+/// Whether stops leave much less than plays, by the criterion of the structures with the penalty of the smaller residual.
+fn are_better(
+    stops: &Compared,
+    plays: &Compared,
+    prepared: &Prepared,
+    policy: &StructurePolicy,
+) -> bool {
+    let values = prepared.values();
+    let [stops, plays] = [stops, plays].map(|found| &found.candidates[found.chosen]);
+    let closer = if stops.rms < plays.rms { stops } else { plays };
+    let each = closer.used / closer.parameters.max(1) as f64;
+    let criterion = |candidate: &Candidate| {
+        2.0 * values * candidate.rms.max(f64::MIN_POSITIVE).ln()
+            + each * candidate.parameters as f64 * values.ln()
+    };
+    criterion(stops) < criterion(plays) + values * policy.of_stops.ln()
 }
 
 /// Whether stops before the dynamics of plays, or before the same without their dead time, leave less than the plays.
@@ -116,7 +137,7 @@ fn promises_more(
 fn compare_elements(
     prepared: &mut Prepared,
     options: &IdentifyOptions,
-    fast: bool,
+    quick: Option<Quick>,
     progress: Progress,
 ) -> Result<Compared, Error> {
     let settings = &IdentifySettings::default();
@@ -167,7 +188,7 @@ fn compare_elements(
         }
         let (points, rounds) =
             quasi_static::seeds(prepared, options.delay, &settings.quasi_static, progress)?;
-        let mut search = StructureSearch::new(prepared, &settings.structure, options, false);
+        let mut search = StructureSearch::new(prepared, &settings.structure, options, None);
         // A rich hysteresis hides a sample of delay, so its neighbours are tried with a simple one.
         for point in &points {
             search.climb(point, progress)?;
@@ -175,11 +196,11 @@ fn compare_elements(
         if options.delay.is_none() {
             search.lag(progress)?;
         }
-        enrich(&mut search, fast, progress)?;
+        enrich(&mut search, quick, progress)?;
         let stages = (None, Vec::new(), 0, rounds);
         return compared(search, true, stages, supported);
     };
-    let mut search = StructureSearch::new(prepared, &settings.structure, options, fast);
+    let mut search = StructureSearch::new(prepared, &settings.structure, options, quick);
     search.climb(&seed.point, progress)?;
     if options.order.is_none() {
         search.orders(&mut few, settings, progress)?;
@@ -193,15 +214,18 @@ fn compare_elements(
     } else if options.order.is_none() {
         search.shed(progress)?;
     }
-    enrich(&mut search, fast, progress)?;
+    enrich(&mut search, quick, progress)?;
     let stages = (Some(seed.taps), seed.singular_values, seed.reflected, seed.rounds);
     compared(search, false, stages, supported)
 }
 
-/// Tries the plays of a dense grid, unless `fast`: a search for effects refines its grid later, and so many plays can
-/// take the place of an effect.
-fn enrich(search: &mut StructureSearch, fast: bool, progress: Progress) -> Result<(), Error> {
-    if fast { Ok(()) } else { search.enrich(progress) }
+/// Tries the plays of a dense grid, unless this is a quick comparison: so many plays can take the place of an effect.
+fn enrich(
+    search: &mut StructureSearch,
+    quick: Option<Quick>,
+    progress: Progress,
+) -> Result<(), Error> {
+    if quick.is_some() { Ok(()) } else { search.enrich(progress) }
 }
 
 fn compared(
@@ -210,14 +234,14 @@ fn compared(
     stages: (Option<usize>, Vec<f64>, usize, Vec<Round>),
     supported: usize,
 ) -> Result<Compared, Error> {
-    let failure = search.failure();
+    let (failure, is_crowded) = (search.failure(), search.is_crowded());
     let Some((chosen, refined, candidates)) = search.finish() else {
         // all candidates failed: the first one's reason is that of the data
         return Err(failure.unwrap_or_else(|| {
             Error::parameter("half_widths", "none", "at least one structure is tried")
         }));
     };
-    Ok(Compared { chosen, refined, candidates, quasi_static, stages, supported })
+    Ok(Compared { chosen, refined, candidates, is_crowded, quasi_static, stages, supported })
 }
 
 /// The half-widths that are given, or as many as usual.

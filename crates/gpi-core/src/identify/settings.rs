@@ -109,8 +109,12 @@ settings! {
         /// The rms residual over the noise floor from which on plays of a dense grid are tried: below, they have next to
         /// nothing to gain. By hand.
         near_noise: f64 = 1.01, FROM_ONE;
-        /// Growth of the cost with which a candidate is given up after a few steps: its rms is a fifth larger. By hand.
+        /// Growth of the cost, beyond what fewer parameters save, with which a candidate is given up after a few steps: its rms is
+        /// a fifth larger. By hand.
         hopeless: f64 = 1.44, FROM_ONE;
+        /// Samples for each parameter of the best structure below which a series goes on to the simplest structures, and stops are
+        /// tried as well as plays. By hand: of a slow residual, few of the samples count.
+        crowded: f64 = 40.0, FROM_ONE;
         /// Frequencies at which the response is compared, and the largest over smallest gain of a flat one. By hand.
         frequencies: usize = 32, FROM_ONE;
         flat: f64 = 2.0, FROM_ONE;

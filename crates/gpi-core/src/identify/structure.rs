@@ -12,7 +12,7 @@ use crate::fit::problem::residual_rms;
 use crate::fit::{Grid, RefineOptions};
 use crate::identify::alternation::{DynamicsEstimate, Taps};
 use crate::identify::criterion::Comparison;
-use crate::identify::identification::{Candidate, IdentifyOptions};
+use crate::identify::identification::{Candidate, IdentifyOptions, Quick};
 use crate::identify::settings::{IdentifySettings, StructurePolicy};
 use crate::linear::Sections;
 use crate::progress::{Progress, Report};
@@ -34,26 +34,32 @@ pub(super) struct StructureSearch<'a> {
     comparison: Comparison<'a>,
     half_widths: Option<Grid>,
     thresholds: Option<Grid>,
+    quick: Option<Quick>,
 }
 
 impl<'a> StructureSearch<'a> {
-    /// `fast` rules slow poles out.
     pub(super) fn new(
         prepared: &'a Prepared<'a>,
         policy: &'a StructurePolicy,
         options: &IdentifyOptions,
-        fast: bool,
+        quick: Option<Quick>,
     ) -> Self {
         Self {
-            comparison: Comparison::new(prepared, policy, refine_options(options), fast),
+            comparison: Comparison::new(prepared, policy, refine_options(options), quick.is_some()),
             half_widths: options.half_widths.clone(),
             thresholds: options.thresholds.clone(),
+            quick,
         }
     }
 
     /// Whether slow poles rule out all candidates, and G of the best one is flat beyond them.
     pub(super) fn shows_nothing_fast(&self) -> bool {
         self.comparison.shows_nothing_fast()
+    }
+
+    /// Whether the samples are few for the parameters of the best candidate.
+    pub(super) fn is_crowded(&self) -> bool {
+        self.comparison.is_crowded()
     }
 
     /// Why the first candidate was dropped whose computation failed.
@@ -66,23 +72,33 @@ impl<'a> StructureSearch<'a> {
         self.comparison.finish()
     }
 
-    /// Numbers of plays and deadzones, from many to few, as far as they are not given.
+    /// Numbers of plays and deadzones, from many to few, as far as they are not given. A quick comparison begins with those that
+    /// are asked for.
     fn ladder(&self) -> Vec<(Grid, Grid)> {
-        let choose = |given: &Option<Grid>, count| given.clone().unwrap_or(Grid::Count(count));
         let StructurePolicy { plays, deadzones, .. } = *self.comparison.policy;
-        let mut ladder: Vec<_> = plays
-            .into_iter()
-            .zip(deadzones)
-            .map(|(n, m)| (choose(&self.half_widths, n), choose(&self.thresholds, m)))
-            .collect();
+        let given = [&self.half_widths, &self.thresholds];
+        let fewer = self.quick.map_or([false; 2], |quick| quick.fewer);
+        let rung = |(n, m): (usize, usize)| {
+            let choose = |place: usize, count: usize| match (given[place], fewer[place]) {
+                (Some(Grid::Count(most)), true) => Grid::Count(count.min(*most)),
+                (Some(given), _) => given.clone(),
+                (None, _) => Grid::Count(count),
+            };
+            (choose(0, n), choose(1, m))
+        };
+        let mut ladder: Vec<_> = plays.into_iter().zip(deadzones).map(rung).collect();
         ladder.dedup();
         ladder
     }
 
-    /// Climbs down the ladder before the dynamics of `seed` until two steps have gained nothing.
+    /// Climbs down the ladder before the dynamics of `seed` until two steps have gained nothing, or to its end
+    /// where the samples are few for the parameters.
     pub(super) fn climb(&mut self, seed: &Point, progress: Progress) -> Result<(), Error> {
         let (mut worse, mut least) = (0, f64::INFINITY);
-        for (half_widths, thresholds) in self.ladder() {
+        for (place, (half_widths, thresholds)) in self.ladder().into_iter().enumerate() {
+            if self.quick.is_some() && place > 0 && !self.comparison.is_crowded() {
+                break;
+            }
             let placed = self.placed(seed, &half_widths, &thresholds, progress);
             match Error::unless_interrupted(placed)? {
                 Ok(point) => drop(self.comparison.offer(point, progress)?),
@@ -95,7 +111,7 @@ impl<'a> StructureSearch<'a> {
             let criterion = self.comparison.last_criterion();
             worse = if criterion < least { 0 } else { worse + 1 };
             least = least.min(criterion);
-            if worse == self.comparison.policy.missed {
+            if worse >= self.comparison.policy.missed && !self.comparison.is_crowded() {
                 break;
             }
         }

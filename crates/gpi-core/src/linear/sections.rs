@@ -6,6 +6,7 @@ use super::section::Section;
 use crate::{Error, Matrix};
 use nalgebra::DVector;
 use num_complex::Complex64;
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// `G(z) = z^-delay (D + sum of sections)`, each column of G held to a DC gain by D.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -119,9 +120,35 @@ impl Sections {
         self.sections.iter().flat_map(Section::poles).collect()
     }
 
+    /// Whether a pair of complex poles z has a resonance: its damping `-Re s / |s|`, `s = ln z`, is below `1 / sqrt(2)`.
+    pub(crate) fn has_resonance(&self) -> bool {
+        let resonates =
+            |pole: &Complex64| pole.im != 0.0 && -pole.ln().re < FRAC_1_SQRT_2 * pole.ln().norm();
+        self.poles().iter().any(resonates)
+    }
+
     /// G(1), (outputs, inputs).
     pub(crate) fn dc_gain(&self) -> Matrix {
         self.sections.iter().fold(self.d.clone(), |sum, s| sum + &s.c * s.standing(&s.b))
+    }
+
+    /// The part of G(1) that comes from some of the real poles, (outputs, inputs).
+    pub(crate) fn dc_gain_of(&self, is_wanted: &impl Fn(&Complex64) -> bool) -> Matrix {
+        let mut gain = Matrix::zeros(self.outputs(), self.inputs());
+        for section in &self.sections {
+            let poles = section.poles();
+            let wanted: Vec<&Complex64> = poles.iter().filter(|pole| is_wanted(pole)).collect();
+            match wanted[..] {
+                [] => {}
+                // one of two real poles
+                [pole] if poles.len() == 2 => {
+                    let own = section.part(pole.re);
+                    gain += &own.c * own.standing(&own.b);
+                }
+                _ => gain += &section.c * section.standing(&section.b),
+            }
+        }
+        gain
     }
 
     /// C, (outputs, order).
@@ -259,4 +286,42 @@ fn group(poles: &DVector<Complex64>) -> Vec<Vec<usize>> {
     }
     groups.extend(real.chunks(2).map(<[usize]>::to_vec));
     groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of_poles(poles: &[Complex64]) -> Sections {
+        let count = poles.len();
+        let seen = ComplexMatrix::from_element(1, count, Complex64::new(1.0, 0.0));
+        let driven = ComplexMatrix::from_element(count, 1, Complex64::new(0.3, 0.0));
+        let d = Matrix::from_element(1, 1, 0.2);
+        let sections = vec![Section::from_poles(poles, &seen, &driven, 1)];
+        Sections { delay: 0, sections, d, held: vec![(0, 0.0)] }.holding_present_gain()
+    }
+
+    #[test]
+    fn the_gain_of_one_of_two_real_poles() {
+        let real = |re: f64| Complex64::new(re, 0.0);
+        let both = of_poles(&[real(0.9), real(0.5)]);
+        let slow = both.dc_gain_of(&|pole| pole.re > 0.8);
+        // c b / (1 - p)
+        assert!((slow[(0, 0)] - 0.3 / 0.1).abs() < 1e-9, "{slow}");
+        let all = both.dc_gain_of(&|_| true);
+        assert!((all[(0, 0)] + 0.2 - both.dc_gain()[(0, 0)]).abs() < 1e-9);
+    }
+
+    #[test]
+    fn only_a_weakly_damped_pair_resonates() {
+        // the poles of a mode of natural frequency 0.1 rad a sample
+        let pair = |damping: f64| {
+            let s = 0.1 * Complex64::new(-damping, (1.0 - damping * damping).sqrt());
+            of_poles(&[s.exp(), s.exp().conj()])
+        };
+        assert!(pair(0.02).has_resonance() && pair(0.69).has_resonance());
+        assert!(!pair(0.72).has_resonance());
+        let real = of_poles(&[Complex64::new(-0.3, 0.0), Complex64::new(0.9, 0.0)]);
+        assert!(!real.has_resonance());
+    }
 }

@@ -29,8 +29,22 @@
 use crate::chain::point::Point;
 use crate::effects::Block;
 use crate::explain::state::SearchState;
-use crate::{Error, Experiment, Matrix};
+use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{Cholesky, DVector};
+
+/// Whether the function of time has knots at shorter distances than the longest time constant of a lag of G: it may then follow
+/// what the dynamics lack.
+pub(super) fn is_as_fast_as_lags(record: &Record, point: &Point, place: usize) -> bool {
+    let lags = point.dynamics.poles().into_iter().filter(|pole| pole.im == 0.0 && pole.re > 0.0);
+    let longest = lags.map(|pole| -1.0 / pole.re.ln()).fold(0.0, f64::max);
+    spacing(record, point, place) < longest
+}
+
+/// The distance of the knots, in samples.
+fn spacing(record: &Record, point: &Point, place: usize) -> f64 {
+    let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
+    longest as f64 / point.effects[place].values().len().max(1) as f64
+}
 
 /// Whether the error inside the gaps is larger than that of the fit by more than a factor.
 pub(super) fn are_missed(state: &SearchState, point: &Point, place: usize) -> Result<bool, Error> {
@@ -40,8 +54,7 @@ pub(super) fn are_missed(state: &SearchState, point: &Point, place: usize) -> Re
     if knots < policy.fewest_knots {
         return Ok(false);
     }
-    let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
-    let spacing = longest as f64 / knots as f64;
+    let spacing = spacing(record, point, place);
     let residuals = point.residuals(record)?;
     let cell = policy.gap * spacing / CELLS as f64;
     let mut cells: Vec<Products> = Vec::new();

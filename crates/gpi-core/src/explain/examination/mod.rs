@@ -3,8 +3,8 @@
 //! A trial that is significant, confirmed and substantial ([`super::judgement`]) may still be the work of something
 //! else. Before its effect is named it must also pass the following.
 //!
-//! 1. *Possible*: its values are such as a machine can have ([`Block::is_possible`]).
-//!    A mode does not follow a line, creep or a disturbance ([`crate::fit::line_modes`], [`crate::fit::memory`]).
+//! 1. *Possible*: its values are such as a machine can have ([`Block::is_possible`]). What acts inside a mechanical loop has
+//!    dynamics that resonate. A mode does not follow a line, creep or a disturbance ([`crate::fit::line_modes`], [`crate::fit::memory`]).
 //! 2. *Not a longer fit*: the model without it, fitted again from where the trial ended, does worse by more than chance.
 //!
 //! More is asked of every effect when the search has ended. Before that, another effect that is not found yet would make
@@ -12,7 +12,8 @@
 //!
 //! 3. *Its own part*: what it adds to the output differs from all that the rest of the model can do ([`own_part`]), or a fit
 //!    without it leaves more than the noise.
-//! 4. *Bridges gaps*: a slow function of time predicts gaps between its knots as well as it fits ([`gaps`]).
+//! 4. *Slow*: a slow function of time is slower than the lags of G, and predicts gaps between its knots as well as it fits
+//!    ([`gaps`]).
 //! 5. *Small, or at the noise*: an effect that is a large part of the output, acts a few times only, or acts like a misfit
 //!    of the hysteresis has brought the model near the noise ([`far_from_noise`]). Where it leaves much unexplained, it
 //!    follows another structure.
@@ -28,7 +29,7 @@ use super::judgement::{Evidence, Refusal, judge};
 use super::state::{SearchState, Trial};
 use super::trial::{fitted, join_modes};
 use crate::chain::point::Point;
-use crate::effects::{Block, Effect, FreeOrder, Signature};
+use crate::effects::{Block, Effect, FreeOrder, Place, Signature};
 use crate::fit::line_modes::line_modes;
 use crate::fit::memory::Memory;
 use crate::fit::minimize::Fitted;
@@ -58,8 +59,8 @@ pub(super) fn examine(
         fitted(state, trial.point.without_effect(place), trial.entry, progress)
     })?;
     let cost = without.linearization.cost;
-    let refusal = if !is_possible(&trial.point.effects[place]) {
-        Some(Refusal::Impossible)
+    let refusal = if let Some(refusal) = impossible(&trial.point, place) {
+        Some(refusal)
     } else if !is_mode(state, trial)? {
         Some(Refusal::NotAMode)
     } else {
@@ -86,8 +87,8 @@ pub(super) fn doubt(
     progress: Progress,
 ) -> Result<Option<Refusal>, Error> {
     let point = &state.point;
-    if !is_possible(&point.effects[place]) {
-        return Ok(Some(Refusal::Impossible));
+    if let Some(refusal) = impossible(point, place) {
+        return Ok(Some(refusal));
     }
     if !own_part::is_beyond_chance(state, point, place, state.cost)?
         && !is_needed(state, place, progress)?
@@ -95,6 +96,9 @@ pub(super) fn doubt(
         return Ok(Some(Refusal::NotItsOwn));
     }
     let is_slow = point.effects[place].entry().signature == Signature::SlowInTime;
+    if is_slow && gaps::is_as_fast_as_lags(&state.prepared.record, point, place) {
+        return Ok(Some(Refusal::AsFastAsLags));
+    }
     if is_slow && gaps::are_missed(state, point, place)? {
         return Ok(Some(Refusal::Gaps));
     }
@@ -123,14 +127,17 @@ fn is_mode(state: &SearchState, trial: &Trial) -> Result<bool, Error> {
     join_modes(&mut joined);
     let record = &state.prepared.record;
     let memory = Memory::of(record);
-    let slow = |point: &Point| {
-        point.dynamics.poles().iter().filter(|pole| memory.is_exceeded_by(pole)).count()
-    };
+    let slow = |point: &Point| memory.exceeded_by(&point.dynamics).len();
     Ok(slow(&joined) <= slow(&state.point) && line_modes(&joined, record)?.is_empty())
 }
 
-fn is_possible(effect: &Effect) -> bool {
-    effect.block().is_none_or(Block::is_possible)
+/// Why no machine can have the effect at a place, if so.
+fn impossible(point: &Point, place: usize) -> Option<Refusal> {
+    let effect = &point.effects[place];
+    if matches!(effect.place(), Place::Loops(_)) && !point.dynamics.has_resonance() {
+        return Some(Refusal::NoResonance);
+    }
+    (!effect.block().is_none_or(Block::is_possible)).then_some(Refusal::Impossible)
 }
 
 /// Where the newest effect of a name stands.

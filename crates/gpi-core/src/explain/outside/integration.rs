@@ -1,28 +1,49 @@
 //! Whether the output integrates the input.
 //!
-//! A regression of the output on lags of u and on plays of u is compared with one that also has the first and the second
-//! running integral of u without its mean:
+//! A regression of the output on past values of u and on plays of u is given the first and the second running integral of u
+//! without its mean,
 //!
 //! `I_1(k) = sum_{j<=k} (u(j) - mean u) / N`, and `I_2` the same of `I_1`.
 //!
-//! Both are scored on folds that they were not fitted to. The statistic is the squares of the first over those of the second.
-//! On records of known truth, integrating stages have 2.2 to 550, and fifty others at most 1.4.
+//! It is compared with the same regression without them, and with regressions that have leaking integrals in their place,
+//!
+//! `L_1(k) = L_1(k-1) + (u(k) - L_1(k-1)) / T` from `L_1(0) = u(0)`, and `L_2` the same of `L_1`,
+//!
+//! of time constants T up to a part of the longest experiment: a tank that fills, or a body that is heated, forgets within the
+//! record, and an integrator does not. All are scored on folds that they were not fitted to. The statistic is the least squares
+//! without integrals over those with them.
 
 use crate::explain::policy::OutsidePolicy;
 use crate::rivals::regression::{Features, Sums};
 use crate::rivals::{Plays, RivalPolicy};
 use crate::{Experiment, Record};
 
-/// Lags and plays of every input, then its integrals.
+/// Past values and plays of every input, then its integrals.
 struct Memory<'a> {
     record: &'a Record,
     lags: &'a [usize],
     plays: Plays,
-    /// Of each experiment and input, both integrals.
-    integrals: Vec<Vec<[Vec<f64>; 2]>>,
+    /// Of each experiment: both integrals of all inputs.
+    integrals: Vec<Vec<Vec<f64>>>,
 }
 
-impl Memory<'_> {
+impl<'a> Memory<'a> {
+    /// With the integrals that `integral` makes of a signal.
+    fn new(
+        record: &'a Record,
+        policy: &'a OutsidePolicy,
+        integral: impl Fn(&[f64]) -> Vec<f64>,
+    ) -> Self {
+        let both = |experiment: &Experiment| {
+            let columns = experiment.input.column_iter().map(|u| integral(u.as_slice()));
+            columns.flat_map(|first| [integral(&first), first]).collect()
+        };
+        let spans = vec![2.0; record.inputs().len()];
+        let plays = Plays::of(record, &spans, policy.plays);
+        let integrals = record.experiments().iter().map(both).collect();
+        Self { record, lags: &policy.lags, plays, integrals }
+    }
+
     fn without_integrals(&self) -> usize {
         self.lags.len() * self.record.inputs().len() + self.plays.count()
     }
@@ -43,43 +64,37 @@ impl Features for Memory<'_> {
             }
         }
         self.plays.fill(experiment, k, plays);
-        let known = self.integrals[experiment].iter().flatten();
+        let known = &self.integrals[experiment];
         integrals.iter_mut().zip(known).for_each(|(value, integral)| *value = integral[k]);
     }
 }
 
-/// The squares without the integrals over those with them; `None` where the samples are too few.
+/// The least squares without the integrals over those with them; `None` where the samples are too few.
 pub(super) fn ratio(
     record: &Record,
     output: usize,
     rivals: &RivalPolicy,
     policy: &OutsidePolicy,
 ) -> Option<f64> {
-    let spans = vec![2.0; record.inputs().len()];
-    let features = Memory {
-        record,
-        lags: &policy.lags,
-        plays: Plays::of(record, &spans, policy.plays),
-        integrals: record.experiments().iter().map(both_integrals).collect(),
-    };
     let target = |experiment: usize, k: usize, values: &mut [f64]| {
         values[0] = record.experiments()[experiment].output[(k, output)];
     };
-    let sums = Sums::of(&features, record, 1, target, rivals);
-    let score = |size: usize| Some(sums.cross_validated(size, policy.ridge)?.score());
-    let (without, with) = (score(features.without_integrals())?, score(features.count())?);
-    // squares that are rounding say nothing
-    let least = f64::EPSILON * record.scored() as f64;
-    Some(without.max(least) / with.max(least))
-}
-
-fn both_integrals(experiment: &Experiment) -> Vec<[Vec<f64>; 2]> {
-    let one = |column: nalgebra::DVectorView<f64>| {
-        let first = integral(&column.iter().copied().collect::<Vec<_>>());
-        let second = integral(&first);
-        [first, second]
+    let scores = |features: &Memory| {
+        let sums = Sums::of(features, record, 1, target, rivals);
+        [features.without_integrals(), features.count()]
+            .map(|size| Some(sums.cross_validated(size, policy.ridge)?.score()))
     };
-    experiment.input.column_iter().map(one).collect()
+    let [without, with] = scores(&Memory::new(record, policy, integral));
+    let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0) as f64;
+    let forgotten = policy.forgotten * longest;
+    let mut least = without?;
+    for time in (0..policy.leaks).map(|halvings| forgotten / f64::from(1_u32 << halvings)) {
+        let [_, leaking] = scores(&Memory::new(record, policy, |x| leaking(x, time)));
+        least = least.min(leaking?);
+    }
+    // squares that are rounding say nothing
+    let rounding = f64::EPSILON * record.scored() as f64;
+    Some(least.max(rounding) / with?.max(rounding))
 }
 
 /// The running integral of a signal without its mean.
@@ -92,6 +107,16 @@ fn integral(signal: &[f64]) -> Vec<f64> {
         sum
     };
     signal.iter().map(&mut add).collect()
+}
+
+/// The integral that leaks with a time constant in samples.
+fn leaking(signal: &[f64], time: f64) -> Vec<f64> {
+    let mut state = signal.first().copied().unwrap_or(0.0);
+    let mut follow = |x: &f64| {
+        state += (x - state) / time.max(1.0);
+        state
+    };
+    signal.iter().map(&mut follow).collect()
 }
 
 #[cfg(test)]
@@ -107,18 +132,22 @@ mod tests {
     fn only_an_integral_is_one() {
         let u = slow_input(6000);
         let mut e = noise(8);
-        let (mut position, mut lag, mut creep) = (0.0, 0.0, 0.0);
-        let (mut integrating, mut ordinary) = (Vec::new(), Vec::new());
+        let (mut position, mut lag, mut creep, mut level) = (0.0, 0.0, 0.0, 0.3);
+        let (mut integrating, mut ordinary, mut tank) = (Vec::new(), Vec::new(), Vec::new());
         for (k, u) in u.iter().enumerate() {
             position += 1e-3 * (u - 0.1);
             lag += 0.05 * (u - lag);
             creep += 4e-4 * (lag - creep);
+            // an outflow that grows with the root of the level, as of a tank
+            level = f64::max(level + 5e-3 * (0.6 + 0.2 * u - f64::sqrt(level)), 0.0);
             integrating.push(position + 0.2 * lag + 0.01 * e());
             ordinary.push(lag + 0.2 * creep + 1e-5 * k as f64 + 0.01 * e());
+            tank.push(level + 1e-3 * e());
         }
-        let (integrating, ordinary) = (ratio_of(&integrating, &u), ratio_of(&ordinary, &u));
+        let [integrating, ordinary, tank] = [integrating, ordinary, tank].map(|y| ratio_of(&y, &u));
         let policy = OutsidePolicy::default();
         assert!(integrating > policy.integrated, "{integrating}");
         assert!(ordinary < policy.integrated, "creep and drift: {ordinary}");
+        assert!(tank < policy.integrated, "a slow plant: {tank}");
     }
 }
