@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from plants import textbook
 from plants.excitation import stream
 from plants.hysteresis import play_bank
-from plants.textbook import loops, mechanics, sensing, slow
+from plants.textbook import loops, mechanics, process, sensing, slow
 from plants.textbook.drives import Drive
 from plants.textbook.linear import Mode, lag, modal_sum
 from plants.textbook.run import Run, ordinary
@@ -99,6 +99,32 @@ def test_a_motor_sticks_below_its_friction_and_an_integrator_keeps_its_place() -
     assert moved[3500] == pytest.approx(mechanics.REACH * 0.5, rel=0.1)
     assert abs(moved[3900] - moved[3000]) < 0.01 * moved[3500]
     assert abs(moved[-1]) < 0.01 * moved[3500]
+
+
+def test_a_tank_empties_as_torricelli_says_and_overflows_at_its_top() -> None:
+    inflow = np.concatenate([np.full(4000, 0.8), np.zeros(500)])
+    level = process.levels(inflow, RATE, (1e-2, 0.4), (2.0, 2.0))
+    assert level[3999] == pytest.approx(0.64)
+    # with the upper tank soon empty, sqrt(x) falls by 1 / (2 T) in a second
+    assert np.sqrt(level[4100]) - np.sqrt(level[4300]) == pytest.approx(0.2 / (2 * 0.4), rel=1e-2)
+    assert process.levels(inflow, RATE, (1e-2, 0.4), (2.0, 0.5))[:4000] == pytest.approx(0.5)
+    assert process.levels(inflow, RATE, (1e-2, 0.4), (0.25, 2.0))[3999] == pytest.approx(0.25, rel=1e-3)
+
+
+def test_a_heater_is_two_lags_behind_a_bent_curve() -> None:
+    drive = drive_of(np.concatenate([np.zeros(500), np.full(9500, 0.5)]))
+    run = process.heater(stream("heater", 1), drive)
+    assert abs(run.y[400]) < 5 * run.noise
+    assert 0.5 <= run.y[-500:].mean() < 0.9
+    t = np.arange(9500) / RATE
+    rest = (run.y[-500:].mean() - run.y[500:]) / run.y[-500:].mean()
+    taus = np.geomspace(0.03, 0.3, 60)
+    fits = [
+        left_by(rest, np.stack([np.exp(-t / one), np.exp(-t / other)], axis=1))
+        for one in taus
+        for other in taus[taus > one]
+    ]
+    assert min(fits) < 2 * run.noise / run.y[-500:].mean()
 
 
 @pytest.mark.parametrize("wanted", [0.8, 1.0, 1.2])

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.random import Generator
 
 from ..excitation import Array, stream
-from . import loops, mechanics, operators, sensing, slow
+from . import loops, mechanics, operators, process, sensing, slow
 from .drives import Drive, drive
 from .run import Run
 
@@ -62,6 +62,8 @@ STAGES: dict[str, Stage] = {
     "lugre": stage(mechanics.lugre, may=MEMORY_IN_THE_FORCE, is_bipolar=True),
     "motor": stage(mechanics.motor, may=["friction"], is_bipolar=True),
     "hydraulic": stage(mechanics.hydraulic, is_bipolar=True),
+    "tanks": stage(process.tanks, may=["output-nonlinearity", "saturation"]),
+    "heater": stage(process.heater),
     "two-modes": stage(loops.two_modes, may=["delay", "linear-dynamics"]),
     "flexure": stage(loops.flexure, may=["linear-dynamics"]),
     "feedback": stage(loops.feedback),
