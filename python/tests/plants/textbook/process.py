@@ -19,8 +19,8 @@ def levels(inflow: Array, rate: float, times: tuple[float, float], tops: tuple[f
 
     q is the inflow. What would rise above the top overflows; the tanks begin in equilibrium.
 
-    1. Johansson, The quadruple-tank process, IEEE Transactions on Control Systems Technology 8, 2000 (two of its
-       tanks); Schoukens, Mattsson, Wigren, Noel, Cascaded tanks benchmark, 2016 (the overflow).
+    1. Johansson, The quadruple-tank process, IEEE Transactions on Control Systems Technology 8, 2000 (two of
+       its tanks); Schoukens, Mattsson, Wigren, Noel, Cascaded tanks benchmark, 2016 (the overflow).
     """
     (fill, drain), (first, second), step = times, tops, 1 / rate
     upper, lower = min(inflow[0] ** 2, first), min(inflow[0] ** 2, second)
@@ -43,7 +43,7 @@ def tanks(random: Generator, drive: Drive) -> Run:
 
 
 def heater(random: Generator, drive: Drive) -> Run:
-    """A body that power heats and the air around it cools, whose heat reaches a sensor through its wall [1, ch. 5].
+    """A body that is heated and that the air cools; its heat reaches a sensor through a wall [1, ch. 5].
 
         T theta' = P - theta,    T_s s' = theta - s,    P = (1 + b) u / (1 + b u) the power of a bent valve
 
