@@ -277,8 +277,8 @@ settings! {
         /// Root mean square residual over the noise floor below which no reason is asked for. By hand.
         near_noise: f64 = 1.5, FROM_ONE;
         /// Squares without the integrals of the input over those with them. On records of known truth, integrating stages
-        /// have 1.56 to 260, and a hundred others at most 1.1, but for a heater that begins in motion, which has 1.7.
-        integrated: f64 = 1.3, FROM_ONE;
+        /// have 2.6 and more, others at most 1.7, but for a heater that begins in motion, which has 3.
+        integrated: f64 = 2.0, FROM_ONE;
         /// Past values and plays of the input that stand beside the integrals, and the ridge of the regression: enough to
         /// describe an ordinary stage roughly. By hand.
         lags: [usize; 12] = [0, 1, 2, 3, 5, 8, 12, 20, 32, 50, 80, 128], 0.0..=1e6;

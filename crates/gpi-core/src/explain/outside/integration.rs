@@ -1,11 +1,12 @@
 //! Whether the output integrates the input.
 //!
-//! A regression of the output on past values of u and on plays of u is given the first and the second running integral of u
-//! without its mean,
+//! A regression of the output on past values of u, on plays of u and on a line over time is given the first and the second
+//! running integral of u without its mean,
 //!
 //! `I_1(k) = sum_{j<=k} (u(j) - mean u) / N`, and `I_2` the same of `I_1`.
 //!
-//! It is compared with the same regression without them, and with regressions that have leaking integrals in their place,
+//! The line stands for what integrates to rest at another input than the mean. The regression is compared with the same one without
+//! the integrals, and with regressions that have leaking integrals in their place,
 //!
 //! `L_1(k) = L_1(k-1) + (u(k) - L_1(k-1)) / T` from `L_1(0) = u(0)`, and `L_2` the same of `L_1`,
 //!
@@ -18,7 +19,7 @@ use crate::rivals::regression::{Features, Sums};
 use crate::rivals::{Plays, RivalPolicy};
 use crate::{Experiment, Record};
 
-/// Past values and plays of every input, then its integrals.
+/// Past values and plays of every input and a line, then the integrals of every input.
 struct Memory<'a> {
     record: &'a Record,
     lags: &'a [usize],
@@ -45,7 +46,7 @@ impl<'a> Memory<'a> {
     }
 
     fn without_integrals(&self) -> usize {
-        self.lags.len() * self.record.inputs().len() + self.plays.count()
+        self.lags.len() * self.record.inputs().len() + self.plays.count() + 1
     }
 }
 
@@ -57,13 +58,15 @@ impl Features for Memory<'_> {
     fn fill(&self, experiment: usize, k: usize, row: &mut [f64]) {
         let input = &self.record.experiments()[experiment].input;
         let (own, integrals) = row.split_at_mut(self.without_integrals());
-        let (lags, plays) = own.split_at_mut(self.lags.len() * input.ncols());
+        let (lags, rest) = own.split_at_mut(self.lags.len() * input.ncols());
+        let (plays, line) = rest.split_at_mut(self.plays.count());
         for (i, column) in input.column_iter().enumerate() {
             for (value, lag) in lags[i * self.lags.len()..].iter_mut().zip(self.lags) {
                 *value = column[k.saturating_sub(*lag)];
             }
         }
         self.plays.fill(experiment, k, plays);
+        line.fill(k as f64 / input.nrows() as f64);
         let known = &self.integrals[experiment];
         integrals.iter_mut().zip(known).for_each(|(value, integral)| *value = integral[k]);
     }
@@ -86,9 +89,9 @@ pub(super) fn ratio(
     };
     let [without, with] = scores(&Memory::new(record, policy, integral));
     let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0) as f64;
-    let forgotten = policy.forgotten * longest;
     let mut least = without?;
-    for time in (0..policy.leaks).map(|halvings| forgotten / f64::from(1_u32 << halvings)) {
+    for halvings in 0..policy.leaks {
+        let time = policy.forgotten * longest * 0.5_f64.powi(halvings as i32);
         let [_, leaking] = scores(&Memory::new(record, policy, |x| leaking(x, time)));
         least = least.min(leaking?);
     }
