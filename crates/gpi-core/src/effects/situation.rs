@@ -50,8 +50,7 @@ impl Situation<'_> {
 
     /// Seconds of the longest experiment.
     pub(crate) fn duration(&self) -> f64 {
-        let longest = self.record.experiments().iter().map(|e| e.input.nrows()).max();
-        longest.unwrap_or(0) as f64 / self.record.rate()
+        self.record.longest() as f64 / self.record.rate()
     }
 
     /// Absolute steps of a drive from sample to sample, sorted, zeros apart.

@@ -276,8 +276,8 @@ settings! {
     struct OutsidePolicy {
         /// Root mean square residual over the noise floor below which no reason is asked for. By hand.
         near_noise: f64 = 1.5, FROM_ONE;
-        /// Squares without the integrals of the input over those with them. On records of known truth, integrating stages
-        /// have 2.6 and more, others at most 1.7, but for a heater that begins in motion, which has 3.
+        /// Squares without the integrals of the input over those with them. By hand, between the stages of
+        /// `python/tests/plants/textbook` that integrate and the tanks there.
         integrated: f64 = 2.0, FROM_ONE;
         /// Past values and plays of the input that stand beside the integrals, and the ridge of the regression: enough to
         /// describe an ordinary stage roughly. By hand.

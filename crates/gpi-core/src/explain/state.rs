@@ -153,8 +153,7 @@ impl<'a> SearchState<'a> {
     /// The longest experiment in seconds.
     pub(super) fn duration(&self) -> f64 {
         let record = &self.prepared.record;
-        let longest = record.experiments().iter().map(|e| e.input.nrows()).max();
-        longest.unwrap_or(0) as f64 / record.rate()
+        record.longest() as f64 / record.rate()
     }
 
     /// Training squares of a point.

@@ -40,7 +40,7 @@ pub(crate) fn is_same(own: &Complex<f64>, other: &Complex<f64>) -> bool {
 /// The poles (upper half-plane) of the modes of G that follow a line rather than the input.
 pub(crate) fn line_modes(point: &Point, record: &Record) -> Result<Vec<Complex<f64>>, Error> {
     let settings = LineModeSettings::default();
-    let samples = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0) as f64;
+    let samples = record.longest() as f64;
     // loops act on the states of G
     if point.loops().next().is_some() {
         return Ok(Vec::new());

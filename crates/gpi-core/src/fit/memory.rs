@@ -24,7 +24,7 @@ pub(crate) struct Memory {
 
 impl Memory {
     pub(crate) fn of(record: &Record) -> Self {
-        let samples = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
+        let samples = record.longest();
         let MemorySettings { part, at_once } = MemorySettings::default();
         Self { lag: longest_lag(record.rate()), longest: part * samples as f64, at_once }
     }
@@ -32,8 +32,7 @@ impl Memory {
     /// The lags of G as slow as creep, whose time constant `-1 / ln(pole)` exceeds that of the dynamics; none where the
     /// plant itself is slow.
     pub(crate) fn slow_lags(&self, dynamics: &Sections) -> Vec<Complex<f64>> {
-        let is_slow =
-            |pole: &Complex<f64>| pole.im == 0.0 && pole.re > 0.0 && -1.0 / pole.re.ln() > self.lag;
+        let is_slow = |pole: &Complex<f64>| is_lag(pole) && time_constant(pole) > self.lag;
         let at_once = dynamics.dc_gain() - dynamics.dc_gain_of(&is_slow);
         if at_once.norm() < self.at_once * dynamics.dc_gain().norm() {
             return Vec::new();
@@ -43,7 +42,7 @@ impl Memory {
 
     /// Whether a pole is as slow as a disturbance, `-1 / ln|pole|` its time constant.
     pub(crate) fn is_disturbance(&self, pole: &Complex<f64>) -> bool {
-        -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln() >= self.longest
+        time_constant(pole) >= self.longest
     }
 
     /// The poles of G that are as slow as creep or a disturbance.
@@ -52,6 +51,16 @@ impl Memory {
         let is_slow = |pole: &Complex<f64>| self.is_disturbance(pole) || lags.contains(pole);
         dynamics.poles().into_iter().filter(is_slow).collect()
     }
+}
+
+/// Whether a pole is that of a lag: real and positive.
+pub(crate) fn is_lag(pole: &Complex<f64>) -> bool {
+    pole.im == 0.0 && pole.re > 0.0
+}
+
+/// The time constant of a pole in samples, `-1 / ln|pole|`.
+pub(crate) fn time_constant(pole: &Complex<f64>) -> f64 {
+    -1.0 / pole.norm().max(f64::MIN_POSITIVE).ln()
 }
 
 impl Point {
@@ -66,18 +75,8 @@ impl Point {
             return Ok(None);
         }
         let mut dynamics = Sections::from_delayed_state_space(&own.to_state_space()?)?;
-        let kept = |section: Section| {
-            let poles = section.poles();
-            let wanted: Vec<Complex<f64>> =
-                poles.iter().copied().filter(|pole| !unwanted(pole)).collect();
-            match wanted[..] {
-                [] => None,
-                // one of two real poles
-                [pole] if poles.len() == 2 => Some(section.part(pole.re)),
-                _ => Some(section),
-            }
-        };
-        dynamics.sections = dynamics.sections.into_iter().filter_map(kept).collect();
+        let kept = |section: &Section| section.with_poles(|pole| !unwanted(pole));
+        dynamics.sections = dynamics.sections.iter().filter_map(kept).collect();
         if dynamics.sections.is_empty() || dynamics.poles().iter().any(unwanted) {
             return Ok(None);
         }

@@ -114,10 +114,16 @@ impl Misfit {
 #[cfg(test)]
 mod tests {
     use crate::identify::{IdentifyOptions, identify};
-    use crate::{Channel, Experiment, Matrix, Prediction, Record};
+    use crate::linear::StateSpace;
+    use crate::{Channel, Experiment, Matrix, Model, Prediction, Record};
 
     /// What is known of a gain of one with a sine of the input as its error, `size(k)`, and white noise of 0.01.
     fn known(size: impl Fn(usize) -> f64) -> Prediction {
+        predicting(size, |_| ()).prediction().unwrap().clone()
+    }
+
+    /// The model with what is known of it, after it was changed.
+    fn predicting(size: impl Fn(usize) -> f64, change: impl Fn(&mut Model)) -> Model {
         let mut random = 4711.0;
         let mut noise = || {
             random = (random * 16807.0) % 2_147_483_647.0;
@@ -138,9 +144,23 @@ mod tests {
             thresholds: Some(crate::identify::Grid::Count(0)),
             ..IdentifyOptions::default()
         };
-        let found = identify(&record, &options, &mut |_| true).unwrap();
-        let model = found.model.with_prediction(&found.refinement, &record).unwrap();
-        model.prediction().unwrap().clone()
+        let mut found = identify(&record, &options, &mut |_| true).unwrap();
+        change(&mut found.model);
+        found.model.with_prediction(&found.refinement, &record).unwrap()
+    }
+
+    #[test]
+    fn a_model_that_diverges_from_rest_has_no_prediction() {
+        let diverging = |model: &mut Model| {
+            // a gain at which the output overflows, so that the model has as many numbers as before
+            let [a, b, c] =
+                [(0, 0), (0, 1), (1, 0)].map(|(rows, columns)| Matrix::zeros(rows, columns));
+            let d = Matrix::from_element(1, 1, f64::MAX);
+            model.linear = StateSpace::new(a, b, c, d).unwrap();
+            assert!(model.simulate(&Matrix::from_fn(9, 1, |k, _| 5.0 * k as f64)).is_err());
+        };
+        assert!(predicting(|_| 0.0, |_| ()).prediction().is_some());
+        assert!(predicting(|_| 0.0, diverging).prediction().is_none());
     }
 
     #[test]

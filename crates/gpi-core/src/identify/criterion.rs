@@ -55,6 +55,12 @@ impl Tried {
     }
 }
 
+/// `N ln e^2 + c p ln N` of a candidate over so many values N, c the samples that a parameter takes.
+pub(super) fn criterion(candidate: &Candidate, samples: f64, values: f64) -> f64 {
+    let deviance = 2.0 * values * candidate.rms.max(f64::MIN_POSITIVE).ln();
+    deviance + samples * candidate.parameters as f64 * values.ln()
+}
+
 /// Refines structures and compares them.
 pub(super) struct Comparison<'a> {
     pub prepared: &'a Prepared<'a>,
@@ -178,9 +184,8 @@ impl<'a> Comparison<'a> {
         let values = self.prepared.values();
         let samples = self.samples();
         for (candidate, tried) in self.candidates.iter_mut().zip(&mut self.refined) {
-            let deviance = 2.0 * values * candidate.rms.max(f64::MIN_POSITIVE).ln();
             candidate.used = samples * candidate.parameters as f64;
-            tried.criterion = deviance + candidate.used * values.ln();
+            tried.criterion = criterion(candidate, samples, values);
             candidate.criterion = if tried.is_usable() { tried.criterion } else { f64::INFINITY };
         }
     }
@@ -258,10 +263,13 @@ impl<'a> Comparison<'a> {
     /// The place of the best candidate, usable if any is.
     fn chosen(&self) -> Option<usize> {
         let places = 0..self.candidates.len();
-        let of_all = |i: &usize| !self.has_usable() || self.refined[*i].is_usable();
+        let has_usable = self.has_usable();
+        let competes = |&place: &usize| !has_usable || self.refined[place].is_usable();
         let criterion = |i: usize| self.refined[i].criterion;
-        let usable = places.clone().filter(of_all);
-        let best = usable.min_by(|&i, &j| criterion(i).total_cmp(&criterion(j)))?;
+        let best = places
+            .clone()
+            .filter(competes)
+            .min_by(|&i, &j| criterion(i).total_cmp(&criterion(j)))?;
         let own = &self.candidates[best];
         let is_rival = |&place: &usize| {
             let other = &self.candidates[place];

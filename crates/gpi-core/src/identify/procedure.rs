@@ -22,6 +22,7 @@ use crate::fit::minimize::fit;
 use crate::fit::preparation::Prepared;
 use crate::fit::{Grid, RefineOptions};
 use crate::identify::alternation::{self, Taps};
+use crate::identify::criterion::criterion;
 use crate::identify::identification::{Candidate, IdentifyOptions, Quick, Round};
 use crate::identify::quasi_static;
 use crate::identify::settings::{AlternationPolicy, IdentifySettings, StructurePolicy};
@@ -54,7 +55,7 @@ pub(crate) fn prepare<'a>(
 
 /// Seeds and compares structures.
 ///
-/// Where nothing else is asked for, stops are compared as well if they promise more than the best plays.
+/// Where nothing else is asked for, stops are compared as well if they promise more than the best plays, or if the samples are few.
 pub(super) fn compare_on_all(
     prepared: &mut Prepared,
     options: &IdentifyOptions,
@@ -93,12 +94,9 @@ fn are_better(
     let values = prepared.values();
     let [stops, plays] = [stops, plays].map(|found| &found.candidates[found.chosen]);
     let closer = if stops.rms < plays.rms { stops } else { plays };
-    let each = closer.used / closer.parameters.max(1) as f64;
-    let criterion = |candidate: &Candidate| {
-        2.0 * values * candidate.rms.max(f64::MIN_POSITIVE).ln()
-            + each * candidate.parameters as f64 * values.ln()
-    };
-    criterion(stops) < criterion(plays) + values * policy.of_stops.ln()
+    let samples = closer.used / closer.parameters.max(1) as f64;
+    let of = |candidate: &Candidate| criterion(candidate, samples, values);
+    of(stops) < of(plays) + values * policy.of_stops.ln()
 }
 
 /// Whether stops before the dynamics of plays, or before the same without their dead time, leave less than the plays.

@@ -118,7 +118,7 @@ settings! {
         /// Frequencies at which the response is compared, and the largest over smallest gain of a flat one. By hand.
         frequencies: usize = 32, FROM_ONE;
         flat: f64 = 2.0, FROM_ONE;
-        /// The part of the squares of plays that stops may leave at most to be taken instead. By hand: without hysteresis,
+        /// The part of the squares of plays that stops with as many parameters may leave at most to be taken instead. By hand: without hysteresis,
         /// both leave the same.
         of_stops: f64 = 0.8, PART;
         /// Steps of the hysteresis on new grids, and the part of the cost below which a step is the last. By hand:

@@ -101,9 +101,20 @@ impl Section {
         states
     }
 
+    /// The terms of the partial fractions that belong to the poles that are wanted: none, one of two real poles, or all.
+    pub(crate) fn with_poles(&self, is_wanted: impl Fn(&Complex64) -> bool) -> Option<Self> {
+        let poles = self.poles();
+        let wanted: Vec<&Complex64> = poles.iter().filter(|pole| is_wanted(pole)).collect();
+        match wanted[..] {
+            [] => None,
+            [pole] if poles.len() == 2 => Some(self.part(pole.re)),
+            _ => Some(self.clone()),
+        }
+    }
+
     /// The term of the partial fractions that belongs to one of two real poles p, of which q is the other:
     /// `((p b1 + b2) / (p - q)) / (z - p)` at the reference output, seen by the others as `c (1, -q)'`.
-    pub(crate) fn part(&self, p: f64) -> Self {
+    fn part(&self, p: f64) -> Self {
         let q = -self.a[0] - p;
         let b = (self.b.row(0) * p + self.b.row(1)) / (p - q);
         let c = self.c.column(0) - self.c.column(1) * q;

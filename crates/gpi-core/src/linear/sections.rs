@@ -134,21 +134,9 @@ impl Sections {
 
     /// The part of G(1) that comes from some of the real poles, (outputs, inputs).
     pub(crate) fn dc_gain_of(&self, is_wanted: &impl Fn(&Complex64) -> bool) -> Matrix {
-        let mut gain = Matrix::zeros(self.outputs(), self.inputs());
-        for section in &self.sections {
-            let poles = section.poles();
-            let wanted: Vec<&Complex64> = poles.iter().filter(|pole| is_wanted(pole)).collect();
-            match wanted[..] {
-                [] => {}
-                // one of two real poles
-                [pole] if poles.len() == 2 => {
-                    let own = section.part(pole.re);
-                    gain += &own.c * own.standing(&own.b);
-                }
-                _ => gain += &section.c * section.standing(&section.b),
-            }
-        }
-        gain
+        let wanted = self.sections.iter().filter_map(|section| section.with_poles(is_wanted));
+        let none = Matrix::zeros(self.outputs(), self.inputs());
+        wanted.fold(none, |sum, own| sum + &own.c * own.standing(&own.b))
     }
 
     /// C, (outputs, order).

@@ -105,6 +105,11 @@ impl Record {
         self.experiments.iter().map(|experiment| experiment.input.nrows()).sum()
     }
 
+    /// Number of samples of the longest experiment.
+    pub(crate) fn longest(&self) -> usize {
+        self.experiments.iter().map(|experiment| experiment.input.nrows()).max().unwrap_or(0)
+    }
+
     /// Number of scored samples of all experiments.
     pub fn scored(&self) -> usize {
         self.experiments.iter().map(Experiment::scored).sum()

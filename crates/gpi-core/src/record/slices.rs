@@ -65,7 +65,7 @@ impl Record {
         });
         let parts: Vec<Experiment> = parts.collect();
         let is_scored = parts.iter().any(|part| part.scored() > 0);
-        let longest = self.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
+        let longest = self.longest();
         let requirement = format!(
             "holds no scored sample; the record has {} samples in {} experiments, the longest of {} s",
             self.samples(),

@@ -29,21 +29,20 @@
 use crate::chain::point::Point;
 use crate::effects::Block;
 use crate::explain::state::SearchState;
+use crate::fit::memory::{is_lag, time_constant};
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{Cholesky, DVector};
 
 /// Whether the function of time has knots at shorter distances than the longest time constant of a lag of G: it may then follow
 /// what the dynamics lack.
 pub(super) fn is_as_fast_as_lags(record: &Record, point: &Point, place: usize) -> bool {
-    let lags = point.dynamics.poles().into_iter().filter(|pole| pole.im == 0.0 && pole.re > 0.0);
-    let longest = lags.map(|pole| -1.0 / pole.re.ln()).fold(0.0, f64::max);
-    spacing(record, point, place) < longest
+    let lags = point.dynamics.poles().into_iter().filter(is_lag);
+    spacing(record, point, place) < lags.map(|pole| time_constant(&pole)).fold(0.0, f64::max)
 }
 
 /// The distance of the knots, in samples.
 fn spacing(record: &Record, point: &Point, place: usize) -> f64 {
-    let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
-    longest as f64 / point.effects[place].values().len().max(1) as f64
+    record.longest() as f64 / point.effects[place].values().len().max(1) as f64
 }
 
 /// Whether the error inside the gaps is larger than that of the fit by more than a factor.

@@ -3,8 +3,9 @@
 //! A trial that is significant, confirmed and substantial ([`super::judgement`]) may still be the work of something
 //! else. Before its effect is named it must also pass the following.
 //!
-//! 1. *Possible*: its values are such as a machine can have ([`Block::is_possible`]). What acts inside a mechanical loop has
-//!    dynamics that resonate. A mode does not follow a line, creep or a disturbance ([`crate::fit::line_modes`], [`crate::fit::memory`]).
+//! 1. *Possible*: its values are such as a machine can have ([`Block::is_possible`]). G resonates if the effect acts inside a
+//!    mechanical loop. A mode does not follow a line, creep or a disturbance ([`crate::fit::line_modes`],
+//!    [`crate::fit::memory`]).
 //! 2. *Not a longer fit*: the model without it, fitted again from where the trial ended, does worse by more than chance.
 //!
 //! More is asked of every effect when the search has ended. Before that, another effect that is not found yet would make

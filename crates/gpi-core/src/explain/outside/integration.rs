@@ -88,10 +88,9 @@ pub(super) fn ratio(
             .map(|size| Some(sums.cross_validated(size, policy.ridge)?.score()))
     };
     let [without, with] = scores(&Memory::new(record, policy, integral));
-    let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0) as f64;
     let mut least = without?;
     for halvings in 0..policy.leaks {
-        let time = policy.forgotten * longest * 0.5_f64.powi(halvings as i32);
+        let time = policy.forgotten * record.longest() as f64 * 0.5_f64.powi(halvings as i32);
         let [_, leaking] = scores(&Memory::new(record, policy, |x| leaking(x, time)));
         least = least.min(leaking?);
     }

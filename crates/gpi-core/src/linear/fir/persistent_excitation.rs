@@ -17,7 +17,7 @@ const MOST_LAGS: usize = 64;
 /// grows with the taps. The rank at 64 and at 32 lags (fewer for short records) distinguishes the two.
 pub(crate) fn excitation_limit(record: &Record) -> Result<usize, Error> {
     let inputs = record.inputs().len();
-    let longest = record.experiments().iter().map(|e| e.input.nrows()).max().unwrap_or(0);
+    let longest = record.longest();
     let lags = (longest / (4 * inputs)).clamp(2, MOST_LAGS);
     let rank = |lags: usize| -> Result<usize, Error> {
         let (factor, _) = gathered(record, lags)?.decompose();
