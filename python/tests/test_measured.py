@@ -44,6 +44,18 @@ def test_piezo_stack_on_another_experiment(tmp_path: Path, capsys: pytest.Captur
     assert error["nrmse"] < 0.008
 
 
+def test_a_short_record_of_slow_tanks_gets_a_simple_model(capsys: pytest.CaptureFixture[str]) -> None:
+    record = MEASURED / "cascaded-tanks" / "estimation.csv.gz"
+    found = call(capsys, "identify", record)
+    held_out, rival = found["error"]["holdout"]["rms"], min(row["holdout_rms"] for row in found["rivals"])
+    show(capsys, f"cascaded-tanks, held out: {held_out:.2f} V, best rival {rival:.2f} V")
+    assert held_out < rival
+    # the lags of the tanks are no creep
+    found = call(capsys, "explain", record)
+    assert not found["effects"] and "saturates" in found["verdict_reason"]
+    assert found["error"]["after"]["holdout"]["rms"] < 0.5
+
+
 def test_one_sine_does_not_excite_31_taps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     record = MEASURED / "piezo-p885-dbo" / "model_1hz_fullscale.csv"
     assert run(["identify", str(record), "--taps", "31", "-o", str(tmp_path / "out")]) == 3

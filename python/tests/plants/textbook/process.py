@@ -1,4 +1,4 @@
-"""Processes whose own dynamics are slow lags: what a plant for fast motion must not call creep."""
+"""Processes that are slow themselves: their lags are their dynamics and not creep."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .run import Run, measured
 
 
 def levels(inflow: Array, rate: float, times: tuple[float, float], tops: tuple[float, float]) -> Array:
-    """The level of the lower one of two tanks of which the upper one fills it [1], by explicit Euler.
+    """The level of the lower of two tanks, which the upper one fills [1], by explicit Euler.
 
         T_1 x_1' = q - sqrt(x_1),    T_2 x_2' = sqrt(x_1) - sqrt(x_2),    x_i <= top_i
 
-    q is the inflow. What would rise above the top overflows; the tanks begin in equilibrium.
+    q is the inflow. Water above the top overflows; the tanks begin in equilibrium.
 
     1. Johansson, The quadruple-tank process, IEEE Transactions on Control Systems Technology 8, 2000 (two of
        its tanks); Schoukens, Mattsson, Wigren, Noel, Cascaded tanks benchmark, 2016 (the overflow).
@@ -34,7 +34,7 @@ def levels(inflow: Array, rate: float, times: tuple[float, float], tops: tuple[f
 
 
 def tanks(random: Generator, drive: Drive) -> Run:
-    """Two tanks in a row, some of which overflow; a small stream never ends."""
+    """Two tanks in a row, which may overflow. A small stream flows even at a drive of 0."""
     base = random.uniform(0.2, 0.4)
     times = random.uniform(0.08, 0.2), random.uniform(0.08, 0.2)
     tops = random.uniform(0.6, 1.2), random.uniform(0.6, 1.2)
