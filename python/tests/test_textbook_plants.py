@@ -13,6 +13,8 @@ SEEDS = (1000, 1001)
 # A slew limit explains the responses to four jumps; a sensor's curve a part of what a motor integrates.
 MORE = [("maxwell-slip", 1009), ("motor", 3002)]
 INTEGRATING = ("motor", "hydraulic")
+# Their lags outlast the impulse response that the record affords.
+SLOW = [("tanks", 1003), ("tanks", 1004), ("tanks", 1005), ("heater", 1001)]
 # Records with a false name today, and what it is.
 KNOWN: dict[tuple[str, int], str] = {}
 
@@ -33,3 +35,14 @@ def test_nothing_false_is_named(name: str, seed: int) -> None:
     assert set(found.effects) <= label.must | label.may
     reason = found.to_dict()["verdict_reason"] or ""
     assert "integrates" not in reason or name in INTEGRATING
+
+
+@pytest.mark.parametrize(("name", "seed"), SLOW)
+def test_no_simple_model_beats_that_of_a_slow_plant(name: str, seed: int) -> None:
+    run = textbook.draw(name, seed)
+    found = gpi.explain(gpi.Record(run.u, run.y, rate=run.rate))
+    assert not found.effects
+    answer = found.to_dict()
+    assert "integrates" not in (answer["verdict_reason"] or "")
+    rivals = [rival["holdout_rms"] for rival in answer["rivals"]]
+    assert found.after["holdout"]["rms"] < 0.25 * min(rivals)

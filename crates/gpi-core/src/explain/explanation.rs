@@ -161,6 +161,7 @@ pub(super) fn summarise(
         residuals: &residuals_after,
         over_noise: over_noise(&after, &refinement),
         is_structured,
+        poles: &model.linear().poles()?,
         test: (test, &tested_after),
         rivals: &fitted,
     };

@@ -288,6 +288,9 @@ settings! {
         /// experiment; each next one is half as long. By hand: what is forgotten within a twentieth of the record is no integral.
         leaks: usize = 8, 1.0..=30.0;
         forgotten: f64 = 0.05, PART;
+        /// The longest time constant of a model that integrates nothing, over the same length. By hand: such a lag settles within
+        /// the record.
+        settled: f64 = 0.25, PART;
         /// Part of the rms error that a rival must take: less is of no use. By hand.
         useful: f64 = 0.05, PART;
         /// Standard errors of the mean logarithm of the blocks' ratios. With ten blocks and four rivals, 3 % of equal

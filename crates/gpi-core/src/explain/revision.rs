@@ -109,7 +109,7 @@ pub(super) fn shed_lags(state: &mut SearchState, progress: Progress) -> Result<b
         return Ok(false);
     }
     let memory = Memory::of(&state.prepared.record);
-    let lags = memory.slow_lags(&state.point.dynamics);
+    let lags = memory.slow_lags(&state.point, &state.prepared)?;
     let Some(point) = state.point.without(|pole| lags.iter().any(|lag| is_same(lag, pole)))? else {
         return Ok(false);
     };

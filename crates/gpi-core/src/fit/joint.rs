@@ -108,7 +108,8 @@ pub(crate) fn joint(
     }
     let mut fitted = fit(point, record, &fit_options, "refinement", progress)?.after(&history);
     let revives = !quick || products * (fit_options.steps as f64) < own.quick_products;
-    while revives && let Some(better) = revived(&fitted, prepared, &fit_options, progress)? {
+    for _ in 0..if revives { own.revivals } else { 0 } {
+        let Some(better) = revived(&fitted, prepared, &fit_options, progress)? else { break };
         fitted = better;
     }
     let residuals = fitted.point.residuals(record)?;

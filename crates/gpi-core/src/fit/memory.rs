@@ -1,15 +1,15 @@
 //! Poles of G that are too slow for a mechanical stage: creep and disturbances have effects of their own.
 //!
-//! Let `G = F + S`, S the real poles that are slower than the longest lag of the dynamics, F all else. Creep adds to a response
-//! that is there at once, and its gain is at most that of this response. Where `|F(1)| < c |G(1)|` (Frobenius norms), S is not
-//! creep: the plant itself is slow, such as a tank that fills.
+//! Let `G = F + S`, S the real poles that are slower than the longest lag of the dynamics, F all else. Creep and drift add to a
+//! response that is there at once. Where `|F v| < c |G v|` (norms over the record, v counted from its first sample), S is neither:
+//! the plant itself is slow, such as a tank that fills.
 
 use crate::chain::point::Point;
 use crate::effects::longest_lag;
-use crate::fit::preparation::rescale;
+use crate::fit::preparation::{Prepared, rescale};
 use crate::fit::settings::MemorySettings;
-use crate::linear::{Section, Sections};
-use crate::{Error, Record};
+use crate::linear::{Sections, resonates};
+use crate::{Error, Matrix, Record};
 use nalgebra::Complex;
 
 /// The longest time constants of a mechanical stage's dynamics, in samples.
@@ -18,26 +18,31 @@ pub(crate) struct Memory {
     lag: f64,
     /// Of all poles: a slower one is a disturbance.
     longest: f64,
-    /// c, the least part of the gain that is there at once.
+    /// Of the real poles of a plant that is slow itself.
+    of_slow_plant: f64,
+    /// c, the least part of the movement that is there at once.
     at_once: f64,
 }
 
 impl Memory {
     pub(crate) fn of(record: &Record) -> Self {
-        let samples = record.longest();
-        let MemorySettings { part, at_once } = MemorySettings::default();
-        Self { lag: longest_lag(record.rate()), longest: part * samples as f64, at_once }
+        let samples = record.longest() as f64;
+        let MemorySettings { part, of_slow_plant, at_once } = MemorySettings::default();
+        let (longest, of_slow_plant) = (part * samples, of_slow_plant * samples);
+        Self { lag: longest_lag(record.rate()), longest, of_slow_plant, at_once }
     }
 
-    /// The lags of G as slow as creep, whose time constant `-1 / ln(pole)` exceeds that of the dynamics; none where the
-    /// plant itself is slow.
-    pub(crate) fn slow_lags(&self, dynamics: &Sections) -> Vec<Complex<f64>> {
-        let is_slow = |pole: &Complex<f64>| is_lag(pole) && time_constant(pole) > self.lag;
-        let at_once = dynamics.dc_gain() - dynamics.dc_gain_of(&is_slow);
-        if at_once.norm() < self.at_once * dynamics.dc_gain().norm() {
-            return Vec::new();
-        }
-        dynamics.poles().into_iter().filter(is_slow).collect()
+    /// The lags of G as slow as creep, whose time constant `-1 / ln(pole)` exceeds that of the dynamics, or that of a plant
+    /// that is slow itself.
+    pub(crate) fn slow_lags(
+        &self,
+        point: &Point,
+        prepared: &Prepared,
+    ) -> Result<Vec<Complex<f64>>, Error> {
+        let limit =
+            if self.is_slow_plant(point, prepared)? { self.of_slow_plant } else { self.lag };
+        let is_slow = |pole: &Complex<f64>| is_lag(pole) && time_constant(pole) > limit;
+        Ok(point.dynamics.poles().into_iter().filter(is_slow).collect())
     }
 
     /// Whether a pole is as slow as a disturbance, `-1 / ln|pole|` its time constant.
@@ -46,10 +51,36 @@ impl Memory {
     }
 
     /// The poles of G that are as slow as creep or a disturbance.
-    pub(crate) fn exceeded_by(&self, dynamics: &Sections) -> Vec<Complex<f64>> {
-        let lags = self.slow_lags(dynamics);
-        let is_slow = |pole: &Complex<f64>| self.is_disturbance(pole) || lags.contains(pole);
-        dynamics.poles().into_iter().filter(is_slow).collect()
+    pub(crate) fn exceeded_by(
+        &self,
+        point: &Point,
+        prepared: &Prepared,
+    ) -> Result<Vec<Complex<f64>>, Error> {
+        let is_slow_plant = self.is_slow_plant(point, prepared)?;
+        let limit = if is_slow_plant { self.of_slow_plant } else { self.lag.min(self.longest) };
+        let is_slow = |pole: &Complex<f64>| {
+            if is_lag(pole) { time_constant(pole) > limit } else { self.is_disturbance(pole) }
+        };
+        Ok(point.dynamics.poles().into_iter().filter(is_slow).collect())
+    }
+
+    /// Whether poles that are slower than the lags of a mechanical stage, and do not resonate, carry the movement.
+    pub(crate) fn is_slow_plant(&self, point: &Point, prepared: &Prepared) -> Result<bool, Error> {
+        let is_fast = |pole: &Complex<f64>| resonates(pole) || time_constant(pole) <= self.lag;
+        if point.dynamics.poles().iter().all(is_fast) {
+            return Ok(false);
+        }
+        let whole = point.dynamics.to_state_space()?;
+        let fast = point.dynamics.with_poles(is_fast).to_state_space()?;
+        let (mut at_once, mut all) = (0.0, 0.0);
+        for experiment in prepared.driven(point)?.experiments() {
+            let v = &experiment.input;
+            let moved =
+                Matrix::from_fn(v.nrows(), v.ncols(), |k, input| v[(k, input)] - v[(0, input)]);
+            at_once += fast.simulate(&moved)?.norm_squared();
+            all += whole.simulate(&moved)?.norm_squared();
+        }
+        Ok(at_once < self.at_once.powi(2) * all)
     }
 }
 
@@ -74,9 +105,8 @@ impl Point {
         if !own.poles().iter().any(&unwanted) || self.loops().next().is_some() {
             return Ok(None);
         }
-        let mut dynamics = Sections::from_delayed_state_space(&own.to_state_space()?)?;
-        let kept = |section: &Section| section.with_poles(|pole| !unwanted(pole));
-        dynamics.sections = dynamics.sections.iter().filter_map(kept).collect();
+        let whole = Sections::from_delayed_state_space(&own.to_state_space()?)?;
+        let dynamics = whole.with_poles(|pole| !unwanted(pole));
         if dynamics.sections.is_empty() || dynamics.poles().iter().any(unwanted) {
             return Ok(None);
         }
@@ -90,8 +120,11 @@ impl Point {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::Grid;
+    use crate::identify::IdentifyOptions;
+    use crate::identify::procedure::prepare;
     use crate::linear::StateSpace;
-    use crate::{Channel, Experiment, Matrix};
+    use crate::{Channel, Experiment};
 
     /// `d + sum_i gain_i (1 - p_i) / (z - p_i)`.
     fn lags(d: f64, terms: &[(f64, f64)]) -> Sections {
@@ -103,33 +136,46 @@ mod tests {
         Sections::from_state_space(&system, 0).unwrap()
     }
 
-    fn memory() -> Memory {
+    fn record() -> Record {
         let signal = Matrix::from_fn(20_000, 1, |k, _| (0.01 * k as f64).sin());
         let run = Experiment::new(signal.clone(), signal);
         let channel = |name| vec![Channel::new(name, "")];
-        Memory::of(&Record::new(vec![run], 1000.0, channel("u"), channel("y"), vec![]).unwrap())
+        Record::new(vec![run], 1000.0, channel("u"), channel("y"), vec![]).unwrap()
+    }
+
+    /// The slow lags, and all poles that are too slow, of a stage without hysteresis at a sine of 628 samples.
+    fn found(dynamics: Sections) -> [Vec<Complex<f64>>; 2] {
+        let record = record();
+        let options = IdentifyOptions {
+            half_widths: Some(Grid::Count(1)),
+            thresholds: Some(Grid::Count(0)),
+            ..IdentifyOptions::default()
+        };
+        let prepared = prepare(&record, &options).unwrap();
+        let (point, memory) = (prepared.point(dynamics), Memory::of(&record));
+        [
+            memory.slow_lags(&point, &prepared).unwrap(),
+            memory.exceeded_by(&point, &prepared).unwrap(),
+        ]
     }
 
     #[test]
     fn a_slow_lag_beside_a_fast_response_is_creep() {
-        let memory = memory();
         // 0.9 at once or within 5 samples, 0.2 within 200 samples
-        let creeping = lags(0.4, &[(0.5, 0.8), (0.2, 0.995)]);
-        let found = memory.slow_lags(&creeping);
-        assert!(found.len() == 1 && (found[0].re - 0.995).abs() < 1e-9, "{found:?}");
-        assert_eq!(memory.exceeded_by(&creeping), found);
-        assert!(memory.slow_lags(&lags(0.4, &[(0.5, 0.8)])).is_empty());
+        let [lag, all] = found(lags(0.4, &[(0.5, 0.8), (0.2, 0.995)]));
+        assert!(lag.len() == 1 && (lag[0].re - 0.995).abs() < 1e-9, "{lag:?}");
+        assert_eq!(lag, all);
+        assert!(found(lags(0.4, &[(0.5, 0.8)])).concat().is_empty());
     }
 
     #[test]
     fn the_lags_of_a_slow_plant_are_its_dynamics() {
-        let memory = memory();
         // two tanks in a row: nothing is there at once
-        let slow = lags(0.0, &[(3.0, 0.995), (-2.0, 0.9925)]);
-        assert!((slow.dc_gain()[(0, 0)] - 1.0).abs() < 1e-9);
-        assert!(memory.exceeded_by(&slow).is_empty());
-        // but a lag of more than a twentieth of the record is a disturbance
-        let wandering = lags(0.1, &[(0.9, 0.9995)]);
-        assert_eq!(memory.exceeded_by(&wandering).len(), 1);
+        assert!(found(lags(0.0, &[(3.0, 0.995), (-2.0, 0.9925)])).concat().is_empty());
+        // nor where the lag is a tenth of the record
+        assert!(found(lags(0.0, &[(1.0, 0.9995)])).concat().is_empty());
+        // but a lag that has hardly moved anything is a disturbance, even if its gain is large
+        let [_, wandering] = found(lags(0.5, &[(1.0, 0.9995)]));
+        assert_eq!(wandering.len(), 1);
     }
 }

@@ -109,6 +109,13 @@ impl<'a> Comparison<'a> {
         }))
     }
 
+    /// Refines a point that is no candidate.
+    pub(super) fn refined(&self, point: Point, progress: Progress) -> Result<Point, Error> {
+        let Self { prepared, options, fast, .. } = self;
+        let refined = joint(point, prepared, options, f64::INFINITY, *fast, progress)?;
+        Ok(refined.fitted.point)
+    }
+
     /// Drops a candidate because of its error.
     pub(super) fn drop_failed(&mut self, error: Error) {
         self.failures.push(error);
@@ -249,7 +256,7 @@ impl<'a> Comparison<'a> {
         let mut unwanted = line_modes(point, &self.prepared.record)?;
         if self.fast {
             let memory = Memory::of(&self.prepared.record);
-            unwanted.extend(memory.exceeded_by(&point.dynamics));
+            unwanted.extend(memory.exceeded_by(point, self.prepared)?);
         }
         Ok(unwanted)
     }

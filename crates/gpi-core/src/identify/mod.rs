@@ -17,6 +17,7 @@ pub(crate) mod procedure;
 mod quasi_static;
 mod realization;
 mod settings;
+mod slow_plant;
 mod structure;
 
 pub use crate::chain::hysteresis::Elements;

@@ -16,17 +16,17 @@
 
 use crate::chain::bounds::range;
 use crate::chain::hysteresis::{Elements, Parameters};
-use crate::chain::point::DynamicsFreedom;
-use crate::fit::joint::{Refined, fit_options};
+use crate::fit::Grid;
+use crate::fit::joint::Refined;
 use crate::fit::minimize::fit;
 use crate::fit::preparation::Prepared;
-use crate::fit::{Grid, RefineOptions};
 use crate::identify::alternation::{self, Taps};
 use crate::identify::criterion::criterion;
 use crate::identify::identification::{Candidate, IdentifyOptions, Quick, Round};
 use crate::identify::quasi_static;
 use crate::identify::settings::{AlternationPolicy, IdentifySettings, StructurePolicy};
-use crate::identify::structure::StructureSearch;
+use crate::identify::slow_plant;
+use crate::identify::structure::{StructureSearch, short_fit};
 use crate::linear::excitation_limit;
 use crate::progress::{Progress, report};
 use crate::{Error, Record};
@@ -107,10 +107,7 @@ fn promises_more(
     progress: Progress,
 ) -> Result<bool, Error> {
     let own = &plays.fitted.point;
-    let mut options = fit_options(prepared, &RefineOptions::default(), policy.steps);
-    options.freedom.dynamics = DynamicsFreedom::Numerator;
-    options.freedom.identity = false;
-    options.gain = policy.gain;
+    let options = short_fit(prepared, policy);
     let mut delays = vec![own.dynamics.delay, 0];
     delays.dedup();
     for delay in delays {
@@ -211,6 +208,12 @@ fn compare_elements(
         }
     } else if options.order.is_none() {
         search.shed(progress)?;
+    }
+    if options.order.is_none() {
+        let slow = slow_plant::seed(&seed.point, prepared, &settings.slow, progress);
+        if let Some(seed) = Error::unless_interrupted(slow)?.ok().flatten() {
+            search.slow(&seed, progress)?;
+        }
     }
     enrich(&mut search, quick, progress)?;
     let stages = (Some(seed.taps), seed.singular_values, seed.reflected, seed.rounds);

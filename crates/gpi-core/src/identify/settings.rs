@@ -13,6 +13,8 @@ pub(crate) struct IdentifySettings {
     pub taps: TapPolicy,
     /// Hysteresis and dynamics in turn.
     pub alternation: AlternationPolicy,
+    /// A plant that is slower than the taps.
+    pub slow: SlowPolicy,
     /// A gain with a delay.
     pub quasi_static: QuasiStaticPolicy,
     /// Orders of the first estimates of G.
@@ -26,6 +28,7 @@ impl IdentifySettings {
     pub(crate) fn validate(&self) -> Result<(), Error> {
         self.taps.validate()?;
         self.alternation.validate()?;
+        self.slow.validate()?;
         self.quasi_static.validate()?;
         self.realization.validate()?;
         self.structure.validate()
@@ -64,6 +67,18 @@ settings! {
         gain: f64 = 1e-4, PART;
         /// A round that lowers the rms by less than this part is the last one. By hand.
         small: f64 = 5e-3, PART;
+    }
+
+    /// Lags of a plant that is slower than the taps.
+    struct SlowPolicy {
+        /// The shortest time constant that is tried, in samples: shorter ones are not told from each other. By hand.
+        shortest: f64 = 5.0, FROM_ONE;
+        /// The longest one, as a part of the longest experiment: the record does not show slower ones to settle. By hand.
+        longest: f64 = 0.5, PART;
+        /// The ratio of one time constant to the next. By hand: all are refined.
+        ratio: f64 = 1.5, 1.01..=10.0;
+        /// Experiments that take part, the longest ones. By hand: each has an offset and a start of its own in every fit.
+        experiments: usize = 8, FROM_ONE;
     }
 
     /// A gain with a delay.

@@ -6,7 +6,7 @@ use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{DynamicsFreedom, Point};
 use crate::fit::dense::dense;
 use crate::fit::joint::{Refined, fit_options};
-use crate::fit::minimize::fit;
+use crate::fit::minimize::{FitOptions, fit};
 use crate::fit::preparation::{Prepared, rescale};
 use crate::fit::problem::residual_rms;
 use crate::fit::{Grid, RefineOptions};
@@ -27,6 +27,15 @@ pub(super) fn refine_options(options: &IdentifyOptions) -> RefineOptions {
         robust: options.robust,
         offset_knots: options.offset_knots,
     }
+}
+
+/// A short fit of the hysteresis and the zeros of G, on new grids.
+pub(super) fn short_fit(prepared: &Prepared, policy: &StructurePolicy) -> FitOptions {
+    let mut options = fit_options(prepared, &RefineOptions::default(), policy.steps);
+    options.freedom.dynamics = DynamicsFreedom::Numerator;
+    options.freedom.identity = false;
+    options.gain = policy.gain;
+    options
 }
 
 /// Tries structures in series that end where nothing is gained.
@@ -193,6 +202,19 @@ impl<'a> StructureSearch<'a> {
         Ok(())
     }
 
+    /// Tries lags of a slow plant: refined behind a linear hysteresis first, whose few parameters do not follow what the first
+    /// guess of the lags leaves, then behind the others.
+    pub(super) fn slow(&mut self, seed: &Point, progress: Progress) -> Result<(), Error> {
+        let Some((half_widths, thresholds)) = self.ladder().pop() else { return Ok(()) };
+        let placed = self.placed(seed, &half_widths, &thresholds, progress);
+        let refined = placed.and_then(|linear| self.comparison.refined(linear, progress));
+        match Error::unless_interrupted(refined)? {
+            Ok(linear) => self.climb(&linear, progress),
+            // no model of this kind: the others stand
+            Err(_) => Ok(()),
+        }
+    }
+
     /// Tries the best fit of all without the poles that rule it out: a lower order drops the weakest mode
     /// instead, which may be the stage's own resonance.
     pub(super) fn shed(&mut self, progress: Progress) -> Result<(), Error> {
@@ -244,10 +266,7 @@ impl<'a> StructureSearch<'a> {
                 Parameters { elements, ..Parameters::identity(channel.reading, zones, plays) };
             channel.weights[0] = gain;
         }
-        let mut options = fit_options(prepared, &RefineOptions::default(), policy.steps);
-        options.freedom.dynamics = DynamicsFreedom::Numerator;
-        options.freedom.identity = false;
-        options.gain = policy.gain;
+        let options = short_fit(prepared, policy);
         for place_again in [true, false] {
             prepared.settle(&mut point);
             point = fit(point, &prepared.record, &options, "grids", progress)?.point;

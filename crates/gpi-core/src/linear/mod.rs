@@ -29,4 +29,4 @@ pub(crate) use era::Hankel;
 pub(crate) use fir::{excitation_limit, impulse_response};
 pub(crate) use least_squares::{NormalEquations, bounded};
 pub(crate) use section::{Section, advance, move_poles};
-pub(crate) use sections::Sections;
+pub(crate) use sections::{Sections, resonates};

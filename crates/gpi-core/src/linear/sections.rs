@@ -120,10 +120,8 @@ impl Sections {
         self.sections.iter().flat_map(Section::poles).collect()
     }
 
-    /// Whether a pair of complex poles z has a resonance: its damping `-Re s / |s|`, `s = ln z`, is below `1 / sqrt(2)`.
+    /// Whether any pair of poles resonates.
     pub(crate) fn has_resonance(&self) -> bool {
-        let resonates =
-            |pole: &Complex64| pole.im != 0.0 && -pole.ln().re < FRAC_1_SQRT_2 * pole.ln().norm();
         self.poles().iter().any(resonates)
     }
 
@@ -132,11 +130,10 @@ impl Sections {
         self.sections.iter().fold(self.d.clone(), |sum, s| sum + &s.c * s.standing(&s.b))
     }
 
-    /// The part of G(1) that comes from some of the real poles, (outputs, inputs).
-    pub(crate) fn dc_gain_of(&self, is_wanted: &impl Fn(&Complex64) -> bool) -> Matrix {
-        let wanted = self.sections.iter().filter_map(|section| section.with_poles(is_wanted));
-        let none = Matrix::zeros(self.outputs(), self.inputs());
-        wanted.fold(none, |sum, own| sum + &own.c * own.standing(&own.b))
+    /// The same with some of the poles only, complex ones in pairs, and with D as it is.
+    pub(crate) fn with_poles(&self, is_wanted: impl Fn(&Complex64) -> bool) -> Self {
+        let wanted = self.sections.iter().filter_map(|section| section.with_poles(&is_wanted));
+        Self { sections: wanted.collect(), ..self.clone() }.holding_present_gain()
     }
 
     /// C, (outputs, order).
@@ -233,6 +230,11 @@ impl Sections {
     }
 }
 
+/// Whether a pole z is one of a pair that has a resonance: its damping `-Re s / |s|`, `s = ln z`, is below `1 / sqrt(2)`.
+pub(crate) fn resonates(pole: &Complex64) -> bool {
+    pole.im != 0.0 && -pole.ln().re < FRAC_1_SQRT_2 * pole.ln().norm()
+}
+
 /// The sections of a state space; the first `references` outputs may fix their states' scales.
 fn sections_of(system: &StateSpace, references: usize) -> Result<Vec<Section>, Error> {
     let (poles, vectors) = eigen_of(system)?;
@@ -290,14 +292,14 @@ mod tests {
     }
 
     #[test]
-    fn the_gain_of_one_of_two_real_poles() {
+    fn one_of_two_real_poles() {
         let real = |re: f64| Complex64::new(re, 0.0);
         let both = of_poles(&[real(0.9), real(0.5)]);
-        let slow = both.dc_gain_of(&|pole| pole.re > 0.8);
-        // c b / (1 - p)
-        assert!((slow[(0, 0)] - 0.3 / 0.1).abs() < 1e-9, "{slow}");
-        let all = both.dc_gain_of(&|_| true);
-        assert!((all[(0, 0)] + 0.2 - both.dc_gain()[(0, 0)]).abs() < 1e-9);
+        let slow = both.with_poles(|pole| pole.re > 0.8);
+        // D + c b / (1 - p)
+        assert!((slow.dc_gain()[(0, 0)] - 0.2 - 0.3 / 0.1).abs() < 1e-9, "{slow:?}");
+        assert_eq!(slow.poles().len(), 1);
+        assert!((both.with_poles(|_| true).dc_gain() - both.dc_gain()).amax() < 1e-9);
     }
 
     #[test]

@@ -128,8 +128,8 @@ fn is_mode(state: &SearchState, trial: &Trial) -> Result<bool, Error> {
     join_modes(&mut joined);
     let record = &state.prepared.record;
     let memory = Memory::of(record);
-    let slow = |point: &Point| memory.exceeded_by(&point.dynamics).len();
-    Ok(slow(&joined) <= slow(&state.point) && line_modes(&joined, record)?.is_empty())
+    let slow = |point: &Point| memory.exceeded_by(point, &state.prepared);
+    Ok(slow(&joined)?.len() <= slow(&state.point)?.len() && line_modes(&joined, record)?.is_empty())
 }
 
 /// Why no machine can have the effect at a place, if so.

@@ -11,8 +11,9 @@
 //! `L_1(k) = L_1(k-1) + (u(k) - L_1(k-1)) / T` from `L_1(0) = u(0)`, and `L_2` the same of `L_1`,
 //!
 //! of time constants T up to a part of the longest experiment: a tank that fills, or a body that is heated, forgets within the
-//! record, and an integrator does not. All are scored on folds that they were not fitted to. The statistic is the least squares
-//! without integrals over those with them.
+//! record, and an integrator does not. All are scored on folds that they were not fitted to. The final model stands beside them
+//! where the poles of its G forget within a part of the record. The statistic is the least squares without integrals over those
+//! with them.
 
 use crate::explain::policy::OutsidePolicy;
 use crate::rivals::regression::{Features, Sums};
@@ -72,10 +73,12 @@ impl Features for Memory<'_> {
     }
 }
 
-/// The least squares without the integrals over those with them; `None` where the samples are too few.
+/// The least squares without the integrals over those with them; `None` where the samples are too few. `own` are the squares of
+/// a model that integrates nothing.
 pub(super) fn ratio(
     record: &Record,
     output: usize,
+    own: Option<f64>,
     rivals: &RivalPolicy,
     policy: &OutsidePolicy,
 ) -> Option<f64> {
@@ -88,7 +91,7 @@ pub(super) fn ratio(
             .map(|size| Some(sums.cross_validated(size, policy.ridge)?.score()))
     };
     let [without, with] = scores(&Memory::new(record, policy, integral));
-    let mut least = without?;
+    let mut least = without?.min(own.unwrap_or(f64::INFINITY));
     for halvings in 0..policy.leaks {
         let time = policy.forgotten * record.longest() as f64 * 0.5_f64.powi(halvings as i32);
         let [_, leaking] = scores(&Memory::new(record, policy, |x| leaking(x, time)));
@@ -127,7 +130,7 @@ mod tests {
     use crate::explain::outside::plants::{noise, slow_input, stage};
 
     fn ratio_of(y: &[f64], u: &[f64]) -> f64 {
-        ratio(&stage(u, y), 0, &RivalPolicy::default(), &OutsidePolicy::default()).unwrap()
+        ratio(&stage(u, y), 0, None, &RivalPolicy::default(), &OutsidePolicy::default()).unwrap()
     }
 
     #[test]
