@@ -161,7 +161,6 @@ pub(super) fn summarise(
         residuals: &residuals_after,
         over_noise: over_noise(&after, &refinement),
         is_structured,
-        poles: &model.linear().poles()?,
         test: (test, &tested_after),
         rivals: &fitted,
     };

@@ -2,7 +2,7 @@
 //!
 //! Let `G = F + S`, S the real poles that are slower than the longest lag of the dynamics, F all else. Creep and drift add to a
 //! response that is there at once. Where `|F v| < c |G v|` (norms over the record, v counted from its first sample), S is neither:
-//! the plant itself is slow, such as a tank that fills.
+//! the plant itself is slow, such as a tank that fills. Where S has most of the DC gain only, S is not creep, but may be a disturbance.
 
 use crate::chain::point::Point;
 use crate::effects::longest_lag;
@@ -22,27 +22,38 @@ pub(crate) struct Memory {
     of_slow_plant: f64,
     /// c, the least part of the movement that is there at once.
     at_once: f64,
+    /// The fewest samples that show a plant to be slow.
+    enough: usize,
 }
 
 impl Memory {
     pub(crate) fn of(record: &Record) -> Self {
         let samples = record.longest() as f64;
-        let MemorySettings { part, of_slow_plant, at_once } = MemorySettings::default();
+        let MemorySettings { part, of_slow_plant, at_once, enough } = MemorySettings::default();
         let (longest, of_slow_plant) = (part * samples, of_slow_plant * samples);
-        Self { lag: longest_lag(record.rate()), longest, of_slow_plant, at_once }
+        Self { lag: longest_lag(record.rate()), longest, of_slow_plant, at_once, enough }
     }
 
     /// The lags of G as slow as creep, whose time constant `-1 / ln(pole)` exceeds that of the dynamics, or that of a plant
-    /// that is slow itself.
+    /// that is slow itself; none where they carry most of the DC gain, which creep does not.
     pub(crate) fn slow_lags(
         &self,
         point: &Point,
         prepared: &Prepared,
     ) -> Result<Vec<Complex<f64>>, Error> {
-        let limit =
-            if self.is_slow_plant(point, prepared)? { self.of_slow_plant } else { self.lag };
-        let is_slow = |pole: &Complex<f64>| is_lag(pole) && time_constant(pole) > limit;
-        Ok(point.dynamics.poles().into_iter().filter(is_slow).collect())
+        let is_slow = |pole: &Complex<f64>| is_lag(pole) && time_constant(pole) > self.lag;
+        let own = &point.dynamics;
+        let limit = if self.is_slow_plant(point, prepared)? {
+            self.of_slow_plant
+        } else if own.with_poles(|pole| !is_slow(pole)).dc_gain().norm()
+            < self.at_once * own.dc_gain().norm()
+        {
+            f64::INFINITY
+        } else {
+            self.lag
+        };
+        let exceeds = |pole: &Complex<f64>| is_lag(pole) && time_constant(pole) > limit;
+        Ok(own.poles().into_iter().filter(exceeds).collect())
     }
 
     /// Whether a pole is as slow as a disturbance, `-1 / ln|pole|` its time constant.
@@ -56,10 +67,11 @@ impl Memory {
         point: &Point,
         prepared: &Prepared,
     ) -> Result<Vec<Complex<f64>>, Error> {
+        let lags = self.slow_lags(point, prepared)?;
         let is_slow_plant = self.is_slow_plant(point, prepared)?;
-        let limit = if is_slow_plant { self.of_slow_plant } else { self.lag.min(self.longest) };
         let is_slow = |pole: &Complex<f64>| {
-            if is_lag(pole) { time_constant(pole) > limit } else { self.is_disturbance(pole) }
+            let is_own = is_slow_plant && is_lag(pole);
+            lags.contains(pole) || self.is_disturbance(pole) && !is_own
         };
         Ok(point.dynamics.poles().into_iter().filter(is_slow).collect())
     }
@@ -67,7 +79,7 @@ impl Memory {
     /// Whether poles that are slower than the lags of a mechanical stage, and do not resonate, carry the movement.
     pub(crate) fn is_slow_plant(&self, point: &Point, prepared: &Prepared) -> Result<bool, Error> {
         let is_fast = |pole: &Complex<f64>| resonates(pole) || time_constant(pole) <= self.lag;
-        if point.dynamics.poles().iter().all(is_fast) {
+        if prepared.record.longest() < self.enough || point.dynamics.poles().iter().all(is_fast) {
             return Ok(false);
         }
         let whole = point.dynamics.to_state_space()?;

@@ -188,6 +188,9 @@ settings! {
         /// Part of the movement that is there at once, at least, where a slow lag is creep: the gains of creep add up to about one
         /// at most, so that half of the movement is there at once. By hand, with a margin.
         at_once: f64 = 0.25, PART;
+        /// Samples of the longest experiment that tell a slow plant from the misfit of its hysteresis: 40 for each of the about 50
+        /// parameters of the richest structure. By hand.
+        enough: usize = 2000, FROM_ONE;
     }
 
     /// Which modes of G are examined for following a line, and the lines that are tried.

@@ -213,6 +213,7 @@ fn compare_elements(
         let slow = slow_plant::seed(&seed.point, prepared, &settings.slow, progress);
         if let Some(seed) = Error::unless_interrupted(slow)?.ok().flatten() {
             search.slow(&seed, progress)?;
+            search.orders(&mut few, settings, progress)?;
         }
     }
     enrich(&mut search, quick, progress)?;

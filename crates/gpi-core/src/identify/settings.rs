@@ -77,8 +77,8 @@ settings! {
         longest: f64 = 0.5, PART;
         /// The ratio of one time constant to the next. By hand: all are refined.
         ratio: f64 = 1.5, 1.01..=10.0;
-        /// Experiments that take part, the longest ones. By hand: each has an offset and a start of its own in every fit.
-        experiments: usize = 8, FROM_ONE;
+        /// Stretches of scored samples that take part, the longest ones. By hand: each has an offset and a start of its own in every fit.
+        experiments: usize = 16, FROM_ONE;
     }
 
     /// A gain with a delay.

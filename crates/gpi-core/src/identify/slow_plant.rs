@@ -8,7 +8,7 @@
 //! ```
 //!
 //! C_1, C_2 and D (outputs, inputs) by least squares on y, with u in place of v. Two lags in a row are such a sum. Of a record of many
-//! experiments, the longest ones take part.
+//! stretches of scored samples, the longest ones take part.
 
 use crate::chain::point::Point;
 use crate::fit::memory::Memory;
@@ -17,7 +17,7 @@ use crate::identify::realization::{Refit, refit};
 use crate::identify::settings::SlowPolicy;
 use crate::linear::{Sections, StateSpace};
 use crate::progress::{Progress, report};
-use crate::{Error, Matrix, Record};
+use crate::{Error, Experiment, Matrix, Record};
 use std::cmp::Reverse;
 
 /// The best pair of lags of a plant that is linear otherwise; `None` where the plant is not slow, by a first estimate of it
@@ -60,12 +60,14 @@ pub(super) fn seed(
     Ok(Some(point))
 }
 
-/// So many experiments, the longest ones.
+/// So many stretches of scored samples, the longest ones.
 fn longest_of(record: &Record, count: usize) -> Result<Record, Error> {
-    let mut experiments = record.pieces(0)?.experiments().to_vec();
-    experiments.sort_by_key(|experiment| Reverse(experiment.scored()));
-    experiments.truncate(count);
-    record.with_experiments(experiments)
+    let record = record.pieces(0)?;
+    let mut lengths: Vec<usize> = record.experiments().iter().map(Experiment::scored).collect();
+    lengths.sort_by_key(|&length| Reverse(length));
+    let least = lengths.get(count - 1).copied().unwrap_or(0);
+    let is_long = |experiment: &&Experiment| experiment.scored() >= least;
+    record.with_experiments(record.experiments().iter().filter(is_long).cloned().collect())
 }
 
 /// A lag of every time constant (in samples) for each input, of DC gain one.
@@ -84,11 +86,11 @@ fn lags(constants: &[f64], (outputs, inputs): (usize, usize)) -> Result<StateSpa
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Channel;
     use crate::fit::Grid;
     use crate::fit::memory::time_constant;
     use crate::identify::IdentifyOptions;
     use crate::identify::procedure::prepare;
-    use crate::{Channel, Experiment};
 
     /// The time constants that are found for a stage with so much of its gain at once and two lags in a row, which begins in
     /// motion, with many levels of the input.

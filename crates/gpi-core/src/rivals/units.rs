@@ -45,14 +45,6 @@ impl Units {
         record.with_experiments(experiments)
     }
 
-    /// The sum of the squares of an output's residual over the scored samples, in these units.
-    pub(crate) fn squares(&self, record: &Record, residuals: &[Matrix], output: usize) -> f64 {
-        let [_, scale] = self.outputs[output];
-        let runs = record.experiments().iter().zip(residuals);
-        let runs = runs.flat_map(|(experiment, residual)| experiment.scored_rows(residual));
-        runs.map(|run| run.column(output).norm_squared()).sum::<f64>() / (scale * scale)
-    }
-
     /// Measured minus simulated outputs in the unit of the outputs, of signals in these units.
     pub(super) fn residuals(&self, scaled: &Record, simulated: &[Matrix]) -> Vec<Matrix> {
         let residual = |(experiment, simulated): (&crate::Experiment, &Matrix)| {

@@ -16,10 +16,8 @@ mod winner;
 pub use signs::{Signs, signs};
 
 use super::policy::OutsidePolicy;
-use crate::fit::memory::time_constant;
 use crate::rivals::{Fitted, RivalPolicy, Units};
 use crate::{Error, Matrix, Record};
-use nalgebra::Complex;
 
 /// What the questions are asked about.
 pub(super) struct Situation<'a> {
@@ -31,8 +29,6 @@ pub(super) struct Situation<'a> {
     pub over_noise: f64,
     /// Whether the residual shows more than noise.
     pub is_structured: bool,
-    /// The poles of the final model's G.
-    pub poles: &'a [Complex<f64>],
     /// What is held out, and what the final model leaves there.
     pub test: (&'a Record, &'a [Matrix]),
     /// The simple models.
@@ -53,17 +49,14 @@ pub(super) fn integrates(record: &Record, policy: &OutsidePolicy) -> Result<bool
     let rivals = RivalPolicy::default();
     let scaled = Units::of(record).scaled(record)?;
     let mut ratios = (0..scaled.outputs().len())
-        .filter_map(|output| integration::ratio(&scaled, output, None, &rivals, policy));
+        .filter_map(|output| integration::ratio(&scaled, output, &rivals, policy));
     Ok(ratios.any(|ratio| ratio > policy.integrated))
 }
 
 /// Asks all questions.
 pub(super) fn outside(of: &Situation, policy: &OutsidePolicy) -> Result<Answer, Error> {
     let rivals = RivalPolicy::default();
-    let units = Units::of(of.record);
-    let scaled = units.scaled(of.record)?;
-    let longest = policy.settled * of.record.longest() as f64;
-    let forgets = of.poles.iter().all(|pole| time_constant(pole) <= longest);
+    let scaled = Units::of(of.record).scaled(of.record)?;
     let mut answer = Answer::default();
     let fed_back = feedback::inputs(&scaled, &rivals, policy);
     for &input in &fed_back {
@@ -74,8 +67,7 @@ pub(super) fn outside(of: &Situation, policy: &OutsidePolicy) -> Result<Answer, 
     }
     for (output, channel) in scaled.outputs().iter().enumerate() {
         let name = &channel.name;
-        let own = forgets.then(|| units.squares(of.record, of.residuals, output));
-        let ratio = integration::ratio(&scaled, output, own, &rivals, policy);
+        let ratio = integration::ratio(&scaled, output, &rivals, policy);
         if let Some(ratio) = ratio.filter(|ratio| *ratio > policy.integrated) {
             answer.reasons.push(format!(
                 "the output {name} integrates the input: with the running integrals of the input, a regression on \
