@@ -1,8 +1,9 @@
 //! Poles of G that are too slow for a mechanical stage: creep and disturbances have effects of their own.
 //!
-//! Let `G = F + S`, S the real poles that are slower than the longest lag of the dynamics, F all else. Creep and drift add to a
-//! response that is there at once. Where `|F v| < c |G v|` (norms over the record, v counted from its first sample), S is neither:
-//! the plant itself is slow, such as a tank that fills. Where S has most of the DC gain only, S is not creep, but may be a disturbance.
+//! Let `G = F + S`, S the poles without resonance that are slower than the longest lag of the dynamics, F all else. Creep and drift
+//! add to a response that is there at once. If `|F v| < c |G v|` (norms over the record, v counted from its first sample), the plant
+//! itself is slow, such as a tank that fills, and S is neither. Otherwise, if `|F(1)| < c |G(1)|` with the real poles alone as S, S is
+//! not creep, but it may be a disturbance.
 
 use crate::chain::point::Point;
 use crate::effects::longest_lag;
@@ -41,9 +42,13 @@ impl Memory {
         point: &Point,
         prepared: &Prepared,
     ) -> Result<Vec<Complex<f64>>, Error> {
+        Ok(self.lags_of(&point.dynamics, self.is_slow_plant(point, prepared)?))
+    }
+
+    /// The same, where it is known whether the plant is slow.
+    fn lags_of(&self, own: &Sections, is_slow_plant: bool) -> Vec<Complex<f64>> {
         let is_slow = |pole: &Complex<f64>| is_lag(pole) && time_constant(pole) > self.lag;
-        let own = &point.dynamics;
-        let limit = if self.is_slow_plant(point, prepared)? {
+        let limit = if is_slow_plant {
             self.of_slow_plant
         } else if own.with_poles(|pole| !is_slow(pole)).dc_gain().norm()
             < self.at_once * own.dc_gain().norm()
@@ -53,7 +58,7 @@ impl Memory {
             self.lag
         };
         let exceeds = |pole: &Complex<f64>| is_lag(pole) && time_constant(pole) > limit;
-        Ok(own.poles().into_iter().filter(exceeds).collect())
+        own.poles().into_iter().filter(exceeds).collect()
     }
 
     /// Whether a pole is as slow as a disturbance, `-1 / ln|pole|` its time constant.
@@ -67,8 +72,8 @@ impl Memory {
         point: &Point,
         prepared: &Prepared,
     ) -> Result<Vec<Complex<f64>>, Error> {
-        let lags = self.slow_lags(point, prepared)?;
         let is_slow_plant = self.is_slow_plant(point, prepared)?;
+        let lags = self.lags_of(&point.dynamics, is_slow_plant);
         let is_slow = |pole: &Complex<f64>| {
             let is_own = is_slow_plant && is_lag(pole);
             lags.contains(pole) || self.is_disturbance(pole) && !is_own

@@ -113,8 +113,7 @@ settings! {
         turn: f64 = 1.345, POSITIVE;
         /// Part of the cost that a play must take which was placed again, to be worth another round. By hand.
         worth: f64 = 1e-3, PART;
-        /// Times that such plays are placed again. By hand: usual records need up to four; where the model has the wrong form, small
-        /// gains go on for thousands.
+        /// Times that such plays are placed again. By hand: a model of the wrong form goes on to gain a little each time.
         revivals: usize = 8, 0.0..=1e3;
     }
 
@@ -183,10 +182,11 @@ settings! {
     struct MemorySettings {
         /// Part of the longest experiment: a slower pole follows a disturbance. By hand.
         part: f64 = 0.05, PART;
-        /// The same for a real pole of a plant that is slow itself, which the record does not show to settle. By hand.
+        /// Part of the longest experiment for a real pole of a plant that is slow itself: the record does not show a slower one to
+        /// settle. By hand.
         of_slow_plant: f64 = 0.5, PART;
-        /// Part of the movement that is there at once, at least, where a slow lag is creep: the gains of creep add up to about one
-        /// at most, so that half of the movement is there at once. By hand, with a margin.
+        /// Part of the movement, and of the DC gain, that is there at once, at least, where a slow lag is creep: the gains of creep
+        /// add up to about one at most, so that half of both is there at once. By hand, with a margin.
         at_once: f64 = 0.25, PART;
         /// Samples of the longest experiment that tell a slow plant from the misfit of its hysteresis: 40 for each of the about 50
         /// parameters of the richest structure. By hand.

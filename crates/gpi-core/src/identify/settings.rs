@@ -71,14 +71,14 @@ settings! {
 
     /// Lags of a plant that is slower than the taps.
     struct SlowPolicy {
-        /// The shortest time constant that is tried, in samples: shorter ones are not told from each other. By hand.
+        /// The shortest time constant that is tried, in samples: a shorter lag is as good as none in a slow plant. By hand.
         shortest: f64 = 5.0, FROM_ONE;
         /// The longest one, as a part of the longest experiment: the record does not show slower ones to settle. By hand.
         longest: f64 = 0.5, PART;
         /// The ratio of one time constant to the next. By hand: all are refined.
         ratio: f64 = 1.5, 1.01..=10.0;
         /// Stretches of scored samples that take part, the longest ones. By hand: each has an offset and a start of its own in every fit.
-        experiments: usize = 16, FROM_ONE;
+        stretches: usize = 16, FROM_ONE;
     }
 
     /// A gain with a delay.

@@ -32,14 +32,14 @@ pub(super) fn seed(
     if !memory.is_slow_plant(estimate, prepared)? {
         return Ok(None);
     }
-    let SlowPolicy { shortest, longest, ratio, experiments } = *policy;
+    let SlowPolicy { shortest, longest, ratio, stretches } = *policy;
     let longest = longest * prepared.record.longest() as f64;
     let constants: Vec<f64> =
         std::iter::successors(Some(shortest), |constant| Some(ratio * constant))
             .take_while(|&constant| constant <= longest)
             .collect();
     let size = (prepared.record.outputs().len(), prepared.record.inputs().len());
-    let record = longest_of(&prepared.record, experiments)?;
+    let record = longest_of(&prepared.record, stretches)?;
     let mut best: Option<Refit> = None;
     for (place, first) in constants.iter().enumerate() {
         for second in &constants[place + 1..] {
