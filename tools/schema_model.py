@@ -44,6 +44,7 @@ LOOP = closed(
             "oneOf": [
                 closed({"power": closed({"exponent": of("integer", minimum=2), "scale": size()})}),
                 closed({"stops": closed({"half_widths": listed(size()), "weights": numbers()})}),
+                closed({"bouc-wen": closed({"beta": size("1 over the unit of z"), "gamma": number()})}),
             ]
         },
         "drives": numbers("what the force adds to each state"),
@@ -92,6 +93,7 @@ EFFECTS: dict[str, Schema] = {
         }
     ),
     "stiffness": closed({"loops": listed(LOOP)}),
+    "hysteretic-stiffness": closed({"loops": listed(LOOP)}),
     "output-nonlinearity": closed(
         {"output": OUTPUT, "coefficients": numbers(), "middle": number(), "scale": size()}
     ),

@@ -65,6 +65,15 @@ EFFECTS: dict[str, dict[str, Any]] = {
             }
         ]
     },
+    "hysteretic-stiffness": {
+        "loops": [
+            {
+                "sees": {"output": 0},
+                "law": {"bouc-wen": {"beta": 0.4, "gamma": -0.5}},
+                "drives": [-0.03, 0.01, 0.002],
+            }
+        ]
+    },
     "output-nonlinearity": {"output": 0, "coefficients": [0.02, 0.01], "middle": 0.3, "scale": 5.0},
     "gain-drift": {"output": 0, "changes": [0.02, 0.01, -0.03], "duration": 2.0},
     "backlash": {"output": 0, "half_width": 0.05},

@@ -1,7 +1,7 @@
 """The effects of the catalogue as operations on one sample, from their parameters in a model file.
 
-The equations are those of the page on theory, (E1) to (E13). An effect that is not in :data:`EXPORTED` cannot
-be exported.
+The equations are those of the page on theory, (E1) to (E13) and (E16). An effect that is not in
+:data:`EXPORTED` cannot be exported.
 """
 
 from collections.abc import Callable, Mapping
@@ -109,7 +109,7 @@ def creep(own: Parameters, around: Around) -> list[Operation]:
 
 
 def stiffness(own: Parameters, around: Around) -> list[Operation]:
-    """(E7): laws of the displacement or of the states, which drive the states."""
+    """(E7), (E16): forces that depend on the displacement or on the states, and drive the states."""
     loops = (_loop(inner, around) for inner in own["loops"])
     # stops of which there are none have no force
     return [own for own in loops if own.kind == "power" or own.memory > 0]
@@ -133,6 +133,9 @@ def _loop(inner: Parameters, around: Around) -> Operation:
         law = inner["law"]["power"]
         numbers = {"exponent": int(law["exponent"]), "scale": law["scale"]}
         return Operation("power", "loops", output, numbers, seen=seen, drives=drives)
+    if "bouc-wen" in inner["law"]:
+        law = inner["law"]["bouc-wen"]
+        return Operation("bouc_wen", "loops", output, dict(law), memory=3, seen=seen, drives=drives)
     law = inner["law"]["stops"]
     arrays = {key: np.array(law[key]) for key in ("half_widths", "weights")}
     count = len(law["weights"])
@@ -210,6 +213,7 @@ EXPORTED: dict[str, Callable[[Parameters, Around], list[Operation]]] = {
     "linear-dynamics": linear_dynamics,
     "creep": creep,
     "stiffness": stiffness,
+    "hysteretic-stiffness": stiffness,
     "output-nonlinearity": output_nonlinearity,
     "gain-drift": gain_drift,
     "backlash": backlash,

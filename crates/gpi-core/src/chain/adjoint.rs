@@ -22,7 +22,7 @@
 //! ```text
 //! 6'  ybar  = M' W e(k)
 //! 7'  xbar  = l,   vbar = B' l,   wbar = E' l,   l <- A' l
-//! 5'  (zbar, rbar) = law'^T wbar                      rbar: half-widths of stops
+//! 5'  (zbar, rbar) = law'^T wbar                      rbar: half-widths of stops, beta, gamma
 //! 4'  l    += S' zbar,   vbar += T' zbar   or   ybar_o += zbar
 //! 3'  l    += C' ybar,   vbar += D' ybar
 //! 2'  bar of x_0 = l                                  at the end of the warm-up only
@@ -161,7 +161,7 @@ impl<'a> Back<'a> {
             b: columns(&sections, inputs),
             sections,
             d: &dynamics.d,
-            plays: vec![0.0; loops.iter().map(|inner| inner.law.stops()).sum()],
+            plays: vec![0.0; loops.iter().map(|inner| inner.law.memories()).sum()],
             loops,
             held: vec![0.0; sensed.len()],
             sensed,
@@ -230,14 +230,14 @@ impl<'a> Back<'a> {
 
     /// The loops.
     fn circulate(&mut self, work: &mut [f64], mut marks: &[f64]) {
-        let Places { v, y, z, w, half_widths, .. } = self.places;
+        let Places { v, y, z, w, shapes, .. } = self.places;
         let mut plays = &mut self.plays[..];
         for (number, inner) in self.loops.iter().enumerate() {
             let (own, others) = marks.split_at(inner.law.marks());
-            let (places, rest) = plays.split_at_mut(inner.law.stops());
+            let (places, rest) = plays.split_at_mut(inner.law.memories());
             let around = work[w.start + number];
-            let widths = &mut work[half_widths[number].clone()];
-            let sensitivity = inner.law.adjoint(around, widths, own, places);
+            let shapes = &mut work[shapes[number].clone()];
+            let sensitivity = inner.law.adjoint(around, shapes, own, places);
             work[z.start + number] = sensitivity;
             match &inner.sees {
                 Sees::Output(output) => work[y.start + output] += sensitivity,

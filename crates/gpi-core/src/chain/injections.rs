@@ -14,6 +14,7 @@
 //! | E_j of a loop | x_j | w | 1 |
 //! | S_j, T_i of a loop | z | x_j, v_i | 1 |
 //! | ln r of a stop | half-width | 1 | r |
+//! | beta, gamma of Bouc and Wen's force | itself | 1 | 1 |
 //! | weight of a stop | w | z - F, the stop | 1 |
 //!
 //! A is in observer form, so that a_j multiplies the first state only: `dA/da_j = -e_j e_1'`.
@@ -67,8 +68,8 @@ pub(crate) struct Places {
     pub w: Range<usize>,
     /// What is added to the next state.
     pub states: Range<usize>,
-    /// The half-widths of each loop's stops.
-    pub half_widths: Vec<Range<usize>>,
+    /// The values of each loop's law to which w does not respond linearly.
+    pub shapes: Vec<Range<usize>>,
     pub len: usize,
 }
 
@@ -94,7 +95,7 @@ impl Signals {
         let reading = point.play_curves().map(|curves| curves.values().len());
         let readings = reading.map(&mut take).collect();
         let states = take(point.order());
-        let loops = point.loops().map(|inner| take(1 + inner.law.stops())).collect();
+        let loops = point.loops().map(|inner| take(1 + inner.law.weights())).collect();
         Self { columns, hysteresis, readings, states, loops, len }
     }
 }
@@ -110,8 +111,8 @@ impl Places {
         let (v, y) = (take(point.channels.len()), take(point.dynamics.outputs()));
         let (z, w) = (take(loops), take(loops));
         let states = take(point.order());
-        let half_widths = point.loops().map(|inner| take(inner.law.stops())).collect();
-        Self { v, y, z, w, states, half_widths, len }
+        let shapes = point.loops().map(|inner| take(inner.law.shapes())).collect();
+        Self { v, y, z, w, states, shapes, len }
     }
 }
 
@@ -292,14 +293,19 @@ impl Entries<'_> {
                 add(places.z.start + number, signals.columns[input].start, 1.0);
             }
         }
-        if let Law::Stops { half_widths, weights } = &inner.law {
-            for (stop, r) in half_widths.iter().enumerate() {
-                // by its logarithm
-                add(places.half_widths[number].start + stop, ONE, *r);
+        let shapes = places.shapes[number].clone();
+        match &inner.law {
+            Law::Power { .. } => {}
+            Law::Stops { half_widths, weights } => {
+                for (place, r) in shapes.zip(half_widths) {
+                    // by its logarithm
+                    add(place, ONE, *r);
+                }
+                for stop in 0..weights.len() {
+                    add(places.w.start + number, own.start + 1 + stop, 1.0);
+                }
             }
-            for stop in 0..weights.len() {
-                add(places.w.start + number, own.start + 1 + stop, 1.0);
-            }
+            Law::BoucWen { .. } => shapes.for_each(|place| add(place, ONE, 1.0)),
         }
         unknown
     }

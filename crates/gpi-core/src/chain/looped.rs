@@ -1,7 +1,7 @@
 //! A plant with every kind of thing in the loops around G and behind them, for tests.
 //!
 //! Two inputs and two outputs, three states, three loops: one sum of stops that sees a mixture of states and inputs, a
-//! cubic power and a sum of stops that see an output each, a backlash and a polynomial behind one output. The gains of
+//! cubic power and a force of Bouc and Wen that see an output each, a backlash and a polynomial behind one output. The gains of
 //! the loops are small enough that the plant stays in motion and that plays and stops both stick and slide within a
 //! run.
 
@@ -28,7 +28,11 @@ fn stiffness() -> Stiffness {
                 law: Law::Power { exponent: 3, scale: 4.0 },
                 drives: drives(-0.02),
             },
-            InnerLoop { sees: Sees::Output(0), law: stops([0.1, 0.5]), drives: drives(0.03) },
+            InnerLoop {
+                sees: Sees::Output(0),
+                law: Law::BoucWen { beta: 0.6, gamma: -0.2 },
+                drives: drives(0.03),
+            },
         ],
     }
 }

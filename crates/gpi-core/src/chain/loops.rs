@@ -21,9 +21,13 @@
 //!
 //! where `Fbar_i` arrives from the sample behind and goes on to the one before. A stop whose play slides at every
 //! sample thus passes nothing of z: `dw = g_i m_i dr_i`, the saturated stop. The derivative by a weight is the stop
-//! `z - F_i` itself, and is injected at w (see `injections`). w(k) drives the states for sample k + 1 only, so that no
+//! `z - F_i` itself, and is injected at w (see `injections`).
+//!
+//! Bouc and Wen's force remembers w and the last two z, and depends on the path of z alone; its step and the derivatives of it,
+//! which are the marks, are in [`super::bouc_wen`]. w(k) drives the states for sample k + 1 only, so that no
 //! loop is algebraic and all loops of a sample are evaluated independently of each other.
 
+use super::bouc_wen::Step;
 use super::lanes::{Lanes, NONE, add};
 use crate::effects::{InnerLoop, Law, Sees};
 use crate::linear::dot;
@@ -37,7 +41,7 @@ pub(crate) struct Loops<'a> {
     pub signals: Vec<LoopSignals>,
 }
 
-/// The signals of one loop, its marks, and the places of its plays.
+/// The signals of one loop, its marks, and what its law remembers: the places of its plays, or w and the last two z.
 pub(crate) struct LoopSignals {
     pub z: f64,
     pub w: f64,
@@ -53,7 +57,7 @@ impl<'a> Loops<'a> {
             z: 0.0,
             w: 0.0,
             marks: vec![0.0; inner.law.marks()],
-            places: vec![0.0; inner.law.stops()],
+            places: vec![0.0; inner.law.memories()],
         };
         Self { signals: loops.iter().map(rest).collect(), loops }
     }
@@ -66,7 +70,7 @@ impl<'a> Loops<'a> {
         }
     }
 
-    /// The places of all plays.
+    /// What all laws remember.
     pub(crate) fn places(&mut self) -> impl Iterator<Item = &mut f64> {
         self.signals.iter_mut().flat_map(|own| &mut own.places)
     }
@@ -115,16 +119,22 @@ impl Law {
                 }
                 w
             }
+            Self::BoucWen { beta, gamma } => {
+                let step = Step::new(places[0], [z, places[1], places[2]], *beta, *gamma);
+                places.copy_from_slice(&[step.force, z, places[1]]);
+                marks.copy_from_slice(&step.slopes);
+                step.force
+            }
         }
     }
 
-    /// Changes of w by changes of z and of the half-widths; `places` are the changes of the plays.
+    /// Changes of w by changes of z and of the shape; `places` are the changes of what is remembered.
     #[inline(always)]
     pub(super) fn tangent<S: Simd>(
         &self,
         simd: S,
         z: Lanes,
-        half_widths: &[Lanes],
+        shape: &[Lanes],
         marks: &[f64],
         places: &mut [Lanes],
     ) -> Lanes {
@@ -132,7 +142,7 @@ impl Law {
         match self {
             Self::Power { .. } => add(simd, &mut w, marks[0], &z),
             Self::Stops { weights, .. } => {
-                let stops = weights.iter().zip(half_widths).zip(marks).zip(places);
+                let stops = weights.iter().zip(shape).zip(marks).zip(places);
                 for (((weight, half_width), &mark), place) in stops {
                     if mark != 0.0 {
                         *place = z;
@@ -142,16 +152,23 @@ impl Law {
                     add(simd, &mut w, -weight, place);
                 }
             }
+            Self::BoucWen { .. } => {
+                let changes = [places[0], z, places[1], places[2], shape[0], shape[1]];
+                for (mark, change) in marks.iter().zip(&changes) {
+                    add(simd, &mut w, *mark, change);
+                }
+                places.copy_from_slice(&[w, z, places[1]]);
+            }
         }
         w
     }
 
     /// The cost's sensitivity to z from that to w: the transpose of [`Law::tangent`]. `places` are the sensitivities
-    /// to the plays, and those to the half-widths are written.
+    /// to what is remembered, and those to the shape are written.
     pub(super) fn adjoint(
         &self,
         w: f64,
-        half_widths: &mut [f64],
+        shape: &mut [f64],
         marks: &[f64],
         places: &mut [f64],
     ) -> f64 {
@@ -159,7 +176,7 @@ impl Law {
         match self {
             Self::Power { .. } => z += marks[0] * w,
             Self::Stops { weights, .. } => {
-                let stops = weights.iter().zip(half_widths).zip(marks).zip(places);
+                let stops = weights.iter().zip(shape).zip(marks).zip(places);
                 for (((weight, half_width), &mark), place) in stops {
                     z += weight * w;
                     *place -= weight * w;
@@ -169,6 +186,13 @@ impl Law {
                         *place = 0.0;
                     }
                 }
+            }
+            Self::BoucWen { .. } => {
+                let force = places[0] + w;
+                z += places[1] + marks[1] * force;
+                shape.copy_from_slice(&[marks[4] * force, marks[5] * force]);
+                let older = [marks[2] * force + places[2], marks[3] * force];
+                places.copy_from_slice(&[marks[0] * force, older[0], older[1]]);
             }
         }
         z

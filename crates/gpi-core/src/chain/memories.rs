@@ -56,7 +56,7 @@ fn remembered(effect: &Effect, rate: f64) -> (usize, bool) {
             let states = own.sections(rate).iter().map(|(a, _)| a.len()).sum::<usize>();
             (own.dead_time() + states, false)
         }
-        Place::Loops(own) => (own.loops().iter().map(|inner| inner.law.stops()).sum(), true),
+        Place::Loops(own) => (own.loops().iter().map(|inner| inner.law.memories()).sum(), true),
         Place::Output(own) => (own.rest(0.0).len(), true),
         Place::Added(own) => (own.rest(first).len(), true),
         Place::Curves(_) | Place::Finding(_) => (0, true),

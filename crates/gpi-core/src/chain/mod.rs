@@ -53,6 +53,7 @@
 //! - What a backlash holds before it first slides is taken as independent of the unknowns ([`sensing`]).
 
 pub(crate) mod adjoint;
+mod bouc_wen;
 pub(crate) mod bounds;
 mod effect_columns;
 mod forward;
@@ -62,6 +63,7 @@ pub(crate) mod injections;
 mod lanes;
 #[cfg(test)]
 pub(crate) mod looped;
+
 mod loops;
 mod memories;
 mod model;

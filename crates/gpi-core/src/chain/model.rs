@@ -16,7 +16,9 @@
 use super::loops::Loops;
 use super::plays::Plays;
 use super::stages::Stages;
-use crate::effects::{ClosedLoops, Coefficients, Effect, ParallelSections, Place, Quantity, Units};
+use crate::effects::{
+    ClosedLoops, Coefficients, Effect, InnerLoop, ParallelSections, Place, Quantity, Units,
+};
 use crate::linear::advance;
 use crate::model::{Model, ModelState};
 use crate::operators::{GpiState, Operator};
@@ -119,7 +121,9 @@ impl Model {
             own.map_or(String::new(), |channel| channel.unit.clone())
         };
         let (input, output) = (unit(self.inputs()), unit(self.outputs()));
-        effect.quantities(Units { input: &input, output: &output })
+        let gains = |drives: &[f64]| self.linear().gains_from_states(drives);
+        let force = |inner: &InnerLoop| inner.relative_force(gains);
+        effect.quantities(Units { input: &input, output: &output }, &force)
     }
 
     pub(crate) fn validate_effects(&self) -> Result<(), Error> {
@@ -258,8 +262,8 @@ impl Model {
         }
         let mut places = loops.places();
         for (own, memory) in &mut closed {
-            let stops = own.loops().iter().map(|inner| inner.law.stops()).sum();
-            **memory = places.by_ref().take(stops).map(|place| *place).collect();
+            let memories = own.loops().iter().map(|inner| inner.law.memories()).sum();
+            **memory = places.by_ref().take(memories).map(|place| *place).collect();
         }
     }
 

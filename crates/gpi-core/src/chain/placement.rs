@@ -6,8 +6,10 @@
 //! change z within a bound that [`Point::drop_unused`] states; a deadzone that is silenced changes the output until the
 //! next fit.
 
+use super::bounds::range;
 use super::point::Point;
 use super::table::{Group, Table};
+use crate::Record;
 
 impl Point {
     /// The point with one more play, where there is none of its half-width; its initial place is the mean of those of
@@ -38,6 +40,22 @@ impl Point {
         let place = channel.thresholds[1..].partition_point(|&eta| eta < threshold) + 1;
         channel.thresholds.insert(place, threshold);
         channel.slopes.insert(place, slope);
+        point
+    }
+
+    /// The point without plays and deadzones: v is proportional to the drive. The factor is the sum of the plays' weights times
+    /// the slope of the envelope from the smallest to the largest input.
+    pub(crate) fn without_hysteresis(&self, record: &Record) -> Self {
+        let mut point = self.clone();
+        for (input, channel) in point.channels.iter_mut().enumerate() {
+            let (low, high) = range(record, input);
+            let chord = (channel.envelope(low, high) - channel.envelope(high, low)) / (high - low);
+            let gain: f64 = channel.weights.iter().sum();
+            channel.slopes.fill(0.0);
+            channel.weights.fill(0.0);
+            (channel.slopes[0], channel.weights[0]) = (chord, gain.max(0.0));
+        }
+        point.drop_unused();
         point
     }
 

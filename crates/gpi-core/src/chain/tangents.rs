@@ -12,8 +12,9 @@
 //! dreading(k) = M(k) dy                                (outputs)
 //! ```
 //!
-//! law'(k) and M(k) are known from the pass forward: slopes of powers, which plays of stops slide ([`super::loops`]),
-//! slopes of the output stage ([`super::sensing`]). dr are the injections at the half-widths of stops. At the first
+//! law'(k) and M(k) are known from the pass forward: slopes of powers, which plays of stops slide, derivatives of a step
+//! of Bouc and Wen's force ([`super::loops`]), slopes of the output stage ([`super::sensing`]). dr are the injections at
+//! the half-widths of stops, at beta and at gamma. At the first
 //! sample the state is the steady state of its injections, `dx = (I - A)^-1 (B dv + i_x)`, because the chain was at
 //! rest at its first v before the record. The unknown part of the initial state enters as `dx_j += 1` at the end of the
 //! warm-up. For the unknowns E_j of a loop, i_x is w(0) there, although the simulated steady state contains no `E w`:
@@ -152,7 +153,7 @@ impl<'a> Tangents<'a> {
     /// One tile through a block.
     #[inline(always)]
     fn advance<S: Simd>(&self, simd: S, tile: &mut Tile, trace: &Trace) {
-        let Places { v, y, z, w, states, half_widths, .. } = &self.places;
+        let Places { v, y, z, w, states, shapes, .. } = &self.places;
         let seen = y.start..z.end;
         let mut scored = trace.scored.iter().peekable();
         tile.rows.iter_mut().for_each(Vec::clear);
@@ -195,9 +196,9 @@ impl<'a> Tangents<'a> {
                     }
                 }
                 let (own, others) = marks.split_at(inner.law.marks());
-                let (places, rest) = plays.split_at_mut(inner.law.stops());
-                let widths = &work[half_widths[number].clone()];
-                let around = inner.law.tangent(simd, sum, widths, own, places);
+                let (places, rest) = plays.split_at_mut(inner.law.memories());
+                let shapes = &work[shapes[number].clone()];
+                let around = inner.law.tangent(simd, sum, shapes, own, places);
                 add(simd, &mut work[w.start + number], 1.0, &around);
                 (marks, plays) = (others, rest);
             }

@@ -80,7 +80,7 @@ pub(super) fn tiles(
             states,
             x: vec![NONE; places.states.len()],
             held: vec![NONE; *sensed],
-            plays: vec![NONE; loops.iter().map(|inner| inner.law.stops()).sum()],
+            plays: vec![NONE; loops.iter().map(|inner| inner.law.memories()).sum()],
             work: vec![NONE; places.len],
             rows: vec![Vec::new(); places.y.len()],
         }

@@ -3,7 +3,7 @@
 /// `w = law(z)`, and `w(k)` drives the states of G for sample k + 1: `x+ = A x + B v + E w`.
 ///
 /// No loop is algebraic, because w acts one sample later. With [`Law::Stops`] w is bounded, so that a stable
-/// G stays bounded for any gain of the loop.
+/// G stays bounded for any gain of the loop; with [`Law::BoucWen`] it is where `beta + gamma > 0`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct InnerLoop {
     /// The signal z.
@@ -47,20 +47,50 @@ pub enum Law {
         /// g_i; the last one is 1 and fixes the scale of w.
         weights: Vec<f64>,
     },
+    /// `dw = dz - (beta |dz| w + gamma dz |w|)`: the restoring force of Bouc and Wen with the exponent 1, which contains
+    /// Dahl's friction (gamma = 0).
+    ///
+    /// Y.-K. Wen, *Method for random vibration of hysteretic systems*, J. Eng. Mech. Div. ASCE 102, 1976.
+    BoucWen {
+        /// By how much the force opposes a motion in either direction, in 1 over the unit of z.
+        beta: f64,
+        /// By how much loading softens (gamma > 0) or stiffens (gamma < 0) it, in 1 over the unit of z.
+        gamma: f64,
+    },
 }
 
 impl Law {
-    /// The number of its stops, whose plays are its state.
-    pub(crate) fn stops(&self) -> usize {
+    /// The number of values that it remembers: the places of the plays of stops; w and the last two z of Bouc and Wen's force.
+    pub(crate) fn memories(&self) -> usize {
         match self {
             Self::Power { .. } => 0,
             Self::Stops { half_widths, .. } => half_widths.len(),
+            Self::BoucWen { .. } => 3,
         }
+    }
+
+    /// The number of values to which w does not respond linearly: the half-widths of stops; beta and gamma.
+    pub(crate) fn shapes(&self) -> usize {
+        if let Self::BoucWen { .. } = self { 2 } else { self.memories() }
+    }
+
+    /// The number of weights of a sum.
+    pub(crate) fn weights(&self) -> usize {
+        if let Self::Stops { weights, .. } = self { weights.len() } else { 0 }
     }
 
     /// The number of marks that a step leaves for derivatives.
     pub(crate) fn marks(&self) -> usize {
-        self.stops().max(1)
+        match self {
+            Self::Power { .. } => 1,
+            Self::Stops { half_widths, .. } => half_widths.len().max(1),
+            Self::BoucWen { .. } => 6,
+        }
+    }
+
+    /// Whether w depends on the past of z.
+    pub(crate) fn has_memory(&self) -> bool {
+        self.memories() > 0
     }
 }
 
@@ -71,6 +101,20 @@ impl InnerLoop {
         if let Sees::Mixture { states, .. } = &mut self.sees {
             states.resize(states.len() + count, 0.0);
         }
+    }
+
+    /// The force of w = 1 on the displacement that the loop sees, relative to the linear stiffness: positive where it opposes the
+    /// displacement. `gains` are the outputs in steady state where a column of E is added to the states; `None` where z is no
+    /// displacement, or nothing stands still.
+    ///
+    /// From `y = g v + h w` in steady state, `y / g = v + (h / g) w`: the linear stiffness is 1 / g, and w opposes y with the
+    /// force `-h / g`.
+    pub(crate) fn relative_force(
+        &self,
+        gains: impl Fn(&[f64]) -> Option<nalgebra::DVector<f64>>,
+    ) -> Option<f64> {
+        let Sees::Output(output) = self.sees else { return None };
+        gains(&self.drives).map(|gains| -gains[output]).filter(|force| force.is_finite())
     }
 
     /// Why it is invalid around a G of so many states, inputs and outputs; `None` where it is valid.
@@ -102,6 +146,9 @@ impl InnerLoop {
                 if half_widths.iter().any(|r| r.is_nan() || *r <= 0.0) =>
             {
                 Some("the half-widths of its stops must be positive".to_owned())
+            }
+            Law::BoucWen { beta, .. } if beta.is_nan() || *beta < 0.0 => {
+                Some(format!("has beta = {beta}, but a force that dissipates energy has beta >= 0"))
             }
             _ => None,
         }

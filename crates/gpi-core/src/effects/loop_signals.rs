@@ -40,7 +40,7 @@ pub(super) fn families(situation: &Situation) -> Vec<(Shape, Vec<LoopSignal>)> {
     let displaced = displaced(situation);
     let (apart, together) = (pairs(&displaced, -1.0), pairs(&displaced, 1.0));
     let count = |has_stops: bool| {
-        situation.loops.iter().filter(|inner| (inner.law.stops() > 0) == has_stops).count()
+        situation.loops.iter().filter(|inner| inner.law.has_memory() == has_stops).count()
     };
     // a family follows when all loops of the one before are in the model
     let mut known = 0;

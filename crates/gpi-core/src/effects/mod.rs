@@ -10,6 +10,7 @@ mod flaws;
 mod inner_loop;
 mod knots;
 mod loop_signals;
+mod loop_values;
 mod names;
 mod place;
 mod properties;
@@ -109,6 +110,7 @@ catalogue! {
     linear_dynamics::LinearDynamics: Parallel,
     creep::Creep: Parallel,
     stiffness::Stiffness: Loops,
+    hysteretic_stiffness::HystereticStiffness: Loops,
     output_nonlinearity::OutputNonlinearity: Output,
     gain_drift::GainDrift: Output,
     backlash::Backlash: Output,
@@ -190,10 +192,20 @@ impl Effect {
         }
     }
 
-    /// The parameters as an engineer reads them, with their units.
-    pub fn quantities(&self, units: Units) -> Vec<Quantity> {
+    /// The parameters as an engineer reads them, with their units. `relative_force` is that of loops in steady state, where it
+    /// is known (see [`ClosedLoops::in_steady_state`]).
+    pub fn quantities(
+        &self,
+        units: Units,
+        relative_force: &dyn Fn(&InnerLoop) -> Option<f64>,
+    ) -> Vec<Quantity> {
         match self.place() {
             Place::Finding(own) => own.quantities(units),
+            Place::Loops(own) => {
+                let mut found = own.in_steady_state(units, relative_force);
+                found.extend(own.quantities(units));
+                found
+            }
             place => place.block().map_or_else(Vec::new, |own| own.quantities(units)),
         }
     }

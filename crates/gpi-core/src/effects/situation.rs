@@ -48,6 +48,15 @@ impl Situation<'_> {
         high - low
     }
 
+    /// The standard deviation of an output's displacement.
+    pub(crate) fn rms(&self, output: usize) -> f64 {
+        let samples = self.displacements.iter().map(Matrix::nrows).sum::<usize>() as f64;
+        let columns = || self.displacements.iter().map(|signal| signal.column(output));
+        let mean = columns().map(|column| column.sum()).sum::<f64>() / samples;
+        let squares = columns().map(|column| column.add_scalar(-mean).norm_squared());
+        (squares.sum::<f64>() / samples).sqrt()
+    }
+
     /// Seconds of the longest experiment.
     pub(crate) fn duration(&self) -> f64 {
         self.record.longest() as f64 / self.record.rate()

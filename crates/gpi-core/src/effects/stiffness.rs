@@ -10,12 +10,9 @@
 //!
 //! Around several outputs, the signals `S x + T v` are mixtures: of the displacements first, then of what
 //! drives them (see `loop_signals`).
-//!
-//! The values of a loop are its column of E, its rows of S and T, the logarithms of its half-widths and its
-//! weights. The product of E, the scale of the signal and the scale of w is what the output shows; therefore
-//! the largest element of S and T (powers) or the widest half-width and the last weight (stops) are held.
 
 use super::loop_signals::{LoopSignal, Shape, families};
+use super::loop_values;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{
     Block, ClosedLoops, InnerLoop, Law, Proposal, Quantity, Sees, Situation, Stage, Units,
@@ -50,7 +47,8 @@ impl Stiffness {
             return Vec::new();
         }
         if situation.outputs().len() == 1 {
-            return if situation.loops.is_empty() { powers(situation) } else { Vec::new() };
+            let has_powers = situation.loops.iter().any(|inner| !inner.law.has_memory());
+            return if has_powers { Vec::new() } else { powers(situation) };
         }
         let families = families(situation).into_iter();
         families.flat_map(|(shape, signals)| around(shape, &signals, situation)).collect()
@@ -111,52 +109,13 @@ fn values_of(inner: &InnerLoop) -> usize {
     Stiffness { loops: vec![inner.clone()] }.values().len()
 }
 
-/// Values of a loop that have the same form.
-enum Group<'a> {
-    /// The numbers themselves.
-    Plain(&'a mut Vec<f64>),
-    /// The logarithms of positive numbers.
-    Logarithms(&'a mut Vec<f64>),
-}
-
-/// The values of a loop, in order.
-fn groups(inner: &mut InnerLoop) -> Vec<Group<'_>> {
-    let mut groups = vec![Group::Plain(&mut inner.drives)];
-    if let Sees::Mixture { states, inputs } = &mut inner.sees {
-        groups.extend([Group::Plain(states), Group::Plain(inputs)]);
-    }
-    if let Law::Stops { half_widths, weights } = &mut inner.law {
-        groups.extend([Group::Logarithms(half_widths), Group::Plain(weights)]);
-    }
-    groups
-}
-
 impl Block for Stiffness {
     fn values(&self) -> Vec<f64> {
-        let mut values = Vec::new();
-        for inner in &mut self.loops.clone() {
-            for group in groups(inner) {
-                match group {
-                    Group::Plain(own) => values.extend(own.iter().copied()),
-                    Group::Logarithms(own) => values.extend(own.iter().map(|value| value.ln())),
-                }
-            }
-        }
-        values
+        loop_values::values(&self.loops)
     }
 
     fn set(&mut self, values: &[f64]) {
-        let mut rest = values.iter().copied();
-        for group in self.loops.iter_mut().flat_map(groups) {
-            match group {
-                Group::Plain(own) => {
-                    own.iter_mut().zip(&mut rest).for_each(|(own, new)| *own = new);
-                }
-                Group::Logarithms(own) => {
-                    own.iter_mut().zip(&mut rest).for_each(|(own, new)| *own = new.exp());
-                }
-            }
-        }
+        loop_values::set(&mut self.loops, values);
     }
 
     fn steps(&self) -> Vec<f64> {
@@ -164,67 +123,11 @@ impl Block for Stiffness {
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {
-        let free = |count: usize| vec![(f64::NEG_INFINITY, f64::INFINITY); count];
-        let mut bounds = Vec::new();
-        for inner in &self.loops {
-            bounds.extend(free(inner.drives.len()));
-            if let Sees::Mixture { states, inputs } = &inner.sees {
-                let seen = || states.iter().chain(inputs);
-                bounds.extend(free(states.len() + inputs.len()));
-                let largest =
-                    seen().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-                // a power's scale is in its drives as well
-                if let (Some((place, value)), Law::Power { .. }) = (largest, &inner.law) {
-                    let first = bounds.len() - seen().count();
-                    bounds[first + place] = (value, value);
-                }
-            }
-            if let Law::Stops { half_widths, weights } = &inner.law {
-                /// Largest distance of a half-width from the widest one, in logarithms: a factor of a thousand.
-                const REACH: f64 = 6.9;
-                /// The largest step of a logarithm or a weight.
-                const STEP: f64 = 0.7;
-                let near = |value: f64| (value - STEP, value + STEP);
-                // the widest stop sets the scales of z and of w
-                let held = |last: Option<f64>| last.map(|value| (value, value));
-                let widest = half_widths.last().map(|r| r.ln());
-                let others = half_widths.len().saturating_sub(1);
-                let width = |r: &f64| {
-                    let (low, high) = near(r.ln());
-                    let scale = widest.unwrap_or(0.0);
-                    (low.max(scale - REACH), high.min(scale + REACH))
-                };
-                bounds.extend(half_widths.iter().take(others).map(width));
-                bounds.extend(held(widest));
-                bounds.extend(weights.iter().take(others).map(|weight| near(*weight)));
-                bounds.extend(held(weights.last().copied()));
-            }
-        }
-        bounds
+        loop_values::bounds(&self.loops)
     }
 
-    fn quantities(&self, _: Units) -> Vec<Quantity> {
-        let mut found = Vec::new();
-        for (q, inner) in self.loops.iter().enumerate() {
-            let mut list = |what: &str, values: &[f64], zero_is_absence: bool| {
-                let named = values.iter().enumerate();
-                let quantity = |(i, &value)| {
-                    let name = format!("{what}[{q}][{i}]");
-                    Quantity { zero_is_absence, ..Quantity::new(name, "", value) }
-                };
-                found.extend(named.map(quantity));
-            };
-            list("drive", &inner.drives, true);
-            if let Sees::Mixture { states, inputs } = &inner.sees {
-                list("seen_state", states, false);
-                list("seen_input", inputs, false);
-            }
-            if let Law::Stops { half_widths, weights } = &inner.law {
-                list("half_width", half_widths, false);
-                list("weight", weights, true);
-            }
-        }
-        found
+    fn quantities(&self, units: Units) -> Vec<Quantity> {
+        loop_values::quantities(&self.loops, units)
     }
 }
 
@@ -235,5 +138,13 @@ impl ClosedLoops for Stiffness {
 
     fn loops_mut(&mut self) -> &mut [InnerLoop] {
         &mut self.loops
+    }
+
+    fn in_steady_state(
+        &self,
+        units: Units,
+        relative_force: &dyn Fn(&InnerLoop) -> Option<f64>,
+    ) -> Vec<Quantity> {
+        loop_values::in_steady_state(&self.loops, units, relative_force)
     }
 }

@@ -126,6 +126,8 @@ pub(super) enum Refusal {
     TooRare,
     /// It changes the dynamics of a stage that integrates, and the model is far from the noise.
     Integrates,
+    /// It changes the dynamics of a stage whose output saturates.
+    Saturates,
     /// It is a function of time whose knots are closer than a time constant of the dynamics.
     AsFastAsLags,
     /// It is a spring inside a mechanical loop, and the dynamics have no resonance.
@@ -165,6 +167,9 @@ impl Refusal {
             }
             Self::Integrates => {
                 "would change the dynamics of a stage that integrates its input, and the error of the model would still be far above the noise".to_owned()
+            }
+            Self::Saturates => {
+                "would change the dynamics of a stage whose output saturates, where the model errs most".to_owned()
             }
             Self::AsFastAsLags => {
                 "is a function of time that changes as fast as the dynamics, and may follow what they lack".to_owned()

@@ -6,6 +6,7 @@
 //! | decision | condition |
 //! |---|---|
 //! | an effect is superfluous | `lost` < threshold of the newest effect, and `T_without < f T_with` |
+//! | the hysteresis is superfluous beside a loop around G | `lost` < q ln N for its q parameters, and `T_without < f T_with` |
 //! | an added signal moves to the other side of the output stage | `J_moved < (1 - f) J` |
 //! | a slow function of time is replaced | see [`super::exchange`] |
 //! | an effect replaces slow poles of G | `J_effect <= f J_poles` at the end of the search, else the poles return |
@@ -75,6 +76,26 @@ pub(super) fn drop_superfluous(state: &mut SearchState, progress: Progress) -> R
         } else {
             place += 1;
         }
+    }
+    Ok(())
+}
+
+/// Takes the hysteresis before the dynamics out where a loop around them explains what it did. It had stood for the loop.
+pub(super) fn straighten(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+    let moving = &state.setup.moving;
+    let is_free = moving.half_widths && moving.thresholds;
+    if !is_free || state.point.loops().next().is_none() {
+        return Ok(());
+    }
+    let straight = state.point.without_hysteresis(&state.prepared.record);
+    let unknowns = |point| state.setup.unknowns(point) as f64;
+    let price = (unknowns(&state.point) - unknowns(&straight)) * state.prepared.values().ln();
+    let fitted = state.fit(straight, &state.setup.options, "rearrangement", progress)?;
+    let lost = state.prepared.values() * (fitted.linearization.cost / state.cost).ln();
+    let now = state.held_out(&state.point)?;
+    let then = state.held_out(&fitted.point)?;
+    if is_superfluous(lost, price, [&now, &then], state.setup.policy.revision.superfluous) {
+        (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use super::exchange::{exchange_slow, prefer_driven};
 use super::grid::refine_grids;
 use super::judgement::{Evidence, Refusal, choose, refusal};
 use super::ranking::{ranked, scored_beside};
-use super::revision::{drop_superfluous, rearrange, shed_lags, shed_lines};
+use super::revision::{drop_superfluous, rearrange, shed_lags, shed_lines, straighten};
 use super::setup::SearchSetup;
 use super::state::{Addition, Rejected, SearchState, Trial};
 use super::trial::{join_modes, trial, trials as trials_of};
@@ -130,6 +130,7 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     state.is_rich = false;
     rearrange(state, progress)?;
     drop_superfluous(state, progress)?;
+    straighten(state, progress)?;
     Ok(true)
 }
 

@@ -150,9 +150,9 @@ pub(super) fn start(state: &SearchState, base: &Point, score: Score) -> Result<P
         limits.all(|(value, (low, high))| low <= value && value <= high)
     });
     let loops = score.start.place().closed_loops().map_or(&[][..], ClosedLoops::loops);
-    let has_plays = loops.iter().any(|inner| inner.law.stops() > 0);
-    let FitPolicy { beyond, beyond_with_plays, .. } = state.setup.policy.fits;
-    let most = if has_plays { beyond_with_plays } else { beyond };
+    let has_memory = loops.iter().any(|inner| inner.law.has_memory());
+    let FitPolicy { beyond, beyond_with_memory, .. } = state.setup.policy.fits;
+    let most = if has_memory { beyond_with_memory } else { beyond };
     let squares = |point| state.training_squares(point);
     let is_near = squares(&start)? <= most * squares(base)?;
     Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })

@@ -130,6 +130,19 @@ impl Sections {
         self.sections.iter().fold(self.d.clone(), |sum, s| sum + &s.c * s.standing(&s.b))
     }
 
+    /// `C (I - A)^-1 E`, (outputs): the outputs in steady state where E is added to each next state.
+    pub(crate) fn gains_from_states(&self, e: &[f64]) -> DVector<f64> {
+        let mut sum = DVector::zeros(self.outputs());
+        let mut rest = e;
+        for section in &self.sections {
+            let (own, others) = rest.split_at(section.order());
+            let drive = Matrix::from_column_slice(own.len(), 1, own);
+            sum += (&section.c * section.standing(&drive)).column(0);
+            rest = others;
+        }
+        sum
+    }
+
     /// The same with some of the poles only, complex ones in pairs, and with D as it is.
     pub(crate) fn with_poles(&self, is_wanted: impl Fn(&Complex64) -> bool) -> Self {
         let wanted = self.sections.iter().filter_map(|section| section.with_poles(&is_wanted));

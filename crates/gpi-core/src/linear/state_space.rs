@@ -202,6 +202,14 @@ impl StateSpace {
         Ok(&self.c * states + &self.d)
     }
 
+    /// `C (I - A)^-1 E`, (outputs): the outputs in steady state where E, by the last states, is added to each next state.
+    /// `None` with a pole at z = 1.
+    pub(crate) fn gains_from_states(&self, e: &[f64]) -> Option<DVector<f64>> {
+        let mut column = Matrix::zeros(self.order(), 1);
+        column.rows_mut(self.order() - e.len(), e.len()).copy_from_slice(e);
+        Some((&self.c * self.steady_states(&column)?).column(0).into_owned())
+    }
+
     /// The frequency response G(e^{jw}) at `frequencies` w in rad per sample, each (outputs, inputs); NaN at a pole.
     pub fn frequency_response(&self, frequencies: &[f64]) -> Vec<nalgebra::DMatrix<Complex64>> {
         let [a, b, c, d] = [&self.a, &self.b, &self.c, &self.d].map(|m| m.map(Complex64::from));

@@ -3,7 +3,7 @@
 use super::covariance::Uncertainty;
 use crate::chain::point::{Past, Point};
 use crate::chain::table::Table;
-use crate::effects::{Effect, Units};
+use crate::effects::{Effect, InnerLoop, Units};
 use crate::linear::Sections;
 use crate::{Error, Matrix};
 use nalgebra::{DMatrix, DVector};
@@ -70,7 +70,11 @@ impl Bands {
     pub(crate) fn effect_deviations(&self) -> Result<Vec<Vec<f64>>, Error> {
         let units = Units { input: "", output: "" };
         let quantities = |point: &Point| -> Vec<Vec<f64>> {
-            let of = |effect: &Effect| effect.quantities(units).iter().map(|q| q.value).collect();
+            let gains = |drives: &[f64]| Some(point.dynamics.gains_from_states(drives));
+            let force = |inner: &InnerLoop| inner.relative_force(gains);
+            let of = |effect: &Effect| {
+                effect.quantities(units, &force).iter().map(|q| q.value).collect()
+            };
             point.blocks().iter().map(of).collect()
         };
         let sizes: Vec<usize> = quantities(&self.point).iter().map(Vec::len).collect();

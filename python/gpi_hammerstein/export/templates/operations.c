@@ -64,7 +64,7 @@ static real slew(real *drive, real input, real reach)
 }
 
 @end
-@bent
+@bent|bouc_wen
 /* log(1 + x) for x >= 0 */
 static real log_of_one_plus(real x)
 {
@@ -73,6 +73,10 @@ static real log_of_one_plus(real x)
     while (m > (real)1.5 && halved < 1100) {
         m /= 2;
         ++halved;
+    }
+    while (m < (real)0.7 && halved > -1100) {
+        m *= 2;
+        --halved;
     }
     z = halved ? (m - 1) / (m + 1) : x / (2 + x);
     square = z * z;
@@ -102,6 +106,8 @@ static real exp_less_one(real x)
     return scale * (rest * sum) + (scale - 1);
 }
 
+@end
+@bent
 /* The speed behind a lag, and the transformation of Box and Cox of it. */
 static real bent(real *seen, real speed, real share, real exponent, real knee)
 {
@@ -204,6 +210,45 @@ static real stops(real *places, real z, const real *widths, const real *weights,
         w += weights[i] * (z - places[i]);
     }
     return w;
+}
+
+@end
+@bouc_wen
+/* The force w behind a change of z in one direction: dw = dz - (beta |dz| w + gamma dz |w|). */
+static real changed(real w, real dz, real beta, real gamma)
+{
+    const real sign = dz < 0 ? -1 : 1;
+    real length = dz * sign, k = beta + gamma, kept;
+    if (w * sign < 0) {
+        /* unloading, as far as zero or the end of the change */
+        const real opposing = beta - gamma, x = -opposing * w * sign;
+        real to_zero = length;
+        if (x > -1)
+            to_zero = x * x < (real)1e-16 ? -w * sign : log_of_one_plus(x) / opposing;
+        if (to_zero < length) {
+            length -= to_zero;
+            w = 0;
+        } else
+            k = opposing;
+    }
+    kept = exp_less_one(-k * length);
+    w += w * kept;
+    return w + sign * (k * k * length * length < (real)1e-16 ? length : -kept / k);
+}
+
+/* The force at a sample: z turns back where the parabola through its last three samples does. */
+static real bouc_wen(real *memory, real z, real beta, real gamma)
+{
+    const real before = memory[1];
+    const real slope = (3 * z - 4 * before + memory[2]) / 2, curvature = z - 2 * before + memory[2];
+    real turn = before;
+    if (slope * curvature > 0 && slope * slope < curvature * curvature)
+        turn = z - slope * slope / curvature / 2;
+    memory[0] = changed(memory[0], turn - before, beta, gamma);
+    memory[0] = changed(memory[0], z - turn, beta, gamma);
+    memory[2] = before;
+    memory[1] = z;
+    return memory[0];
 }
 
 @end

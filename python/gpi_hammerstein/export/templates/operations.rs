@@ -48,7 +48,7 @@ fn slew(drive: &mut [Real], input: Real, reach: Real) -> Real {
     drive[0]
 }
 @end
-@bent
+@bent|bouc_wen
 
 /// log(1 + x) for x >= 0
 fn log_of_one_plus(x: Real) -> Real {
@@ -57,7 +57,11 @@ fn log_of_one_plus(x: Real) -> Real {
         m /= 2.0;
         halved += 1;
     }
-    let z = if halved > 0 { (m - 1.0) / (m + 1.0) } else { x / (2.0 + x) };
+    while m < 0.7 && halved > -1100 {
+        m *= 2.0;
+        halved -= 1;
+    }
+    let z = if halved != 0 { (m - 1.0) / (m + 1.0) } else { x / (2.0 + x) };
     let mut sum = 0.0;
     for n in (1_i16..28).rev().step_by(2) {
         sum = sum * z * z + 1.0 / Real::from(n);
@@ -78,6 +82,8 @@ fn exp_less_one(x: Real) -> Real {
     }
     scale * (rest * sum) + (scale - 1.0)
 }
+@end
+@bent
 
 /// The speed behind a lag, and the transformation of Box and Cox of it.
 fn bent(seen: &mut [Real], speed: Real, share: Real, exponent: Real, knee: Real) -> Real {
@@ -159,6 +165,51 @@ fn stops(places: &mut [Real], z: Real, widths: &[Real], weights: &[Real]) -> Rea
         w += weight * (z - *place);
     }
     w
+}
+@end
+@bouc_wen
+
+/// The force w behind a change of z in one direction: dw = dz - (beta |dz| w + gamma dz |w|).
+fn changed(mut w: Real, dz: Real, beta: Real, gamma: Real) -> Real {
+    let sign = if dz < 0.0 { -1.0 } else { 1.0 };
+    let (mut length, mut k) = (dz * sign, beta + gamma);
+    if w * sign < 0.0 {
+        // unloading, as far as zero or the end of the change
+        let opposing = beta - gamma;
+        let x = -opposing * w * sign;
+        let to_zero = if x <= -1.0 {
+            length
+        } else if x * x < 1e-16 {
+            -w * sign
+        } else {
+            log_of_one_plus(x) / opposing
+        };
+        if to_zero < length {
+            length -= to_zero;
+            w = 0.0;
+        } else {
+            k = opposing;
+        }
+    }
+    let kept = exp_less_one(-k * length);
+    w += w * kept;
+    w + sign * if k * k * length * length < 1e-16 { length } else { -kept / k }
+}
+
+/// The force at a sample: z turns back where the parabola through its last three samples does.
+fn bouc_wen(memory: &mut [Real], z: Real, beta: Real, gamma: Real) -> Real {
+    let (before, older) = (memory[1], memory[2]);
+    let slope = (3.0 * z - 4.0 * before + older) / 2.0;
+    let curvature = z - 2.0 * before + older;
+    let mut turn = before;
+    if slope * curvature > 0.0 && slope * slope < curvature * curvature {
+        turn = z - slope * slope / curvature / 2.0;
+    }
+    memory[0] = changed(memory[0], turn - before, beta, gamma);
+    memory[0] = changed(memory[0], z - turn, beta, gamma);
+    memory[2] = before;
+    memory[1] = z;
+    memory[0]
 }
 @end
 @mixture

@@ -213,8 +213,49 @@ function [force, places] = law(own, signal, places)
         case 'stops'
             places = max(signal - own.half_widths(:), min(signal + own.half_widths(:), places));
             force = own.weights(:)' * (signal - places);
+        case 'bouc_wen'
+            before = places(2);
+            slope = (3 * signal - 4 * before + places(3)) / 2;
+            curvature = signal - 2 * before + places(3);
+            turn = before;
+            if slope * curvature > 0 && slope ^ 2 < curvature ^ 2
+                turn = signal - slope ^ 2 / curvature / 2;
+            end
+            force = changed(own, places(1), turn - before);
+            force = changed(own, force, signal - turn);
+            places = [force; signal; before];
         otherwise
             unknown(own);
+    end
+end
+
+function w = changed(own, w, dz)
+    % the force w behind a change of z in one direction: dw = dz - (beta |dz| w + gamma dz |w|)
+    direction = 1 - 2 * (dz < 0);
+    distance = abs(dz);
+    k = own.beta + own.gamma;
+    if w * direction < 0
+        opposing = own.beta - own.gamma;
+        x = opposing * abs(w);
+        to_zero = distance;
+        if abs(x) < 1e-8
+            to_zero = abs(w);
+        elseif x > -1
+            to_zero = log1p(x) / opposing;
+        end
+        if to_zero < distance
+            distance = distance - to_zero;
+            w = 0;
+        else
+            k = opposing;
+        end
+    end
+    kept = expm1(-k * distance);
+    w = w * (1 + kept);
+    if abs(k * distance) < 1e-8
+        w = w + direction * distance;
+    else
+        w = w - direction * kept / k;
     end
 end
 

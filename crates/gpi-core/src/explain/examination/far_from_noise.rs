@@ -14,16 +14,21 @@
 //!   hysteresis does;
 //! - a limit of the input's speed that the input exceeds a few times only, because such a limit explains any error of the
 //!   response to a jump, whatever its cause;
-//! - a loop around dynamics whose output integrates the input, because it makes up for the integrator that G lacks.
+//! - a loop around dynamics whose output integrates the input, because it makes up for the integrator that G lacks;
+//! - a hysteretic force in such a loop that did not take most of the squares when it was added, because it resembles a
+//!   hysteresis before the dynamics.
+//!
+//! A loop is not named, near the noise or not, where the output saturates and the model errs more there than elsewhere: it makes
+//! up for the limit.
 //!
 //! Lines and measured columns are not asked, because no misfit resembles them, nor are modes, other loops and shapes of
 //! hysteresis loops, which may well be a large part.
 
 use super::contribution::contribution;
 use crate::chain::point::Point;
-use crate::effects::{FreeOrder, Place, Signature};
+use crate::effects::{ClosedLoops, Entry, FreeOrder, InnerLoop, Law, Place, Signature};
 use crate::explain::judgement::Refusal;
-use crate::explain::outside::integrates;
+use crate::explain::outside::{integrates, saturates};
 use crate::explain::state::SearchState;
 use crate::{Error, Experiment, Record};
 
@@ -47,6 +52,9 @@ pub(super) fn doubt(
     if !is_asked || entry.signature == Signature::Unique || entry.free_order == FreeOrder::JoinsG {
         return Ok(None);
     }
+    if matches!(of, Place::Loops(_)) && is_saturated(state, point)? {
+        return Ok(Some(Refusal::Saturates));
+    }
     let policy = &state.setup.policy.examination;
     let test = state.setup.test.scored().max(1) as f64;
     let trained = state.prepared.record.scored().max(1) as f64;
@@ -58,14 +66,38 @@ pub(super) fn doubt(
         Ok(Some(Refusal::TooRare))
     } else if matches!(of, Place::Widths(_) | Place::Output(_)) {
         Ok(Some(Refusal::ResemblesMisfit))
-    } else if let Place::Loops(_) = of {
-        let integrates = integrates(&state.prepared.record, &state.setup.policy.outside)?;
-        Ok(integrates.then_some(Refusal::Integrates))
+    } else if let Place::Loops(own) = of {
+        let (record, outside) = (&state.prepared.record, &state.setup.policy.outside);
+        if integrates(record, outside)? {
+            Ok(Some(Refusal::Integrates))
+        } else {
+            let has_memory = |own: &&dyn ClosedLoops| own.loops().iter().any(is_hysteretic);
+            let is_weak = Some(own).filter(has_memory).is_some() && !took_most(state, entry);
+            Ok(is_weak.then_some(Refusal::ResemblesMisfit))
+        }
     } else if size(state, point, place)? > policy.large {
         Ok(Some(Refusal::TooLarge))
     } else {
         Ok(None)
     }
+}
+
+/// Whether the output saturates where the model errs most.
+fn is_saturated(state: &SearchState, point: &Point) -> Result<bool, Error> {
+    let record = &state.prepared.record;
+    saturates(record, &point.residuals(record)?, &state.setup.policy.outside)
+}
+
+/// Whether the law of a loop is a hysteretic force.
+fn is_hysteretic(inner: &InnerLoop) -> bool {
+    matches!(inner.law, Law::BoucWen { .. })
+}
+
+/// Whether an effect took most of the squares that the model without it had left, when it was added.
+fn took_most(state: &SearchState, entry: &Entry) -> bool {
+    let added = state.additions.iter().rfind(|own| own.trial.entry.name == entry.name);
+    let most = -state.setup.policy.examination.left.ln() * state.prepared.values();
+    added.is_some_and(|own| own.trial.deviance > most)
 }
 
 /// How many times the input is faster than an input stage passes unchanged, for one sample or several in a row; `None`

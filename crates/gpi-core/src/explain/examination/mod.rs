@@ -4,7 +4,7 @@
 //! else. Before its effect is named it must also pass the following.
 //!
 //! 1. *Possible*: its values are such as a machine can have ([`Block::is_possible`]). G resonates if the effect acts inside a
-//!    mechanical loop. A mode does not follow a line, creep or a disturbance ([`crate::fit::line_modes`],
+//!    mechanical loop, and a hysteretic force opposes the displacement. A mode does not follow a line, creep or a disturbance ([`crate::fit::line_modes`],
 //!    [`crate::fit::memory`]).
 //! 2. *Not a longer fit*: the model without it, fitted again from where the trial ended, does worse by more than chance.
 //!
@@ -30,7 +30,7 @@ use super::judgement::{Evidence, Refusal, judge};
 use super::state::{SearchState, Trial};
 use super::trial::{fitted, join_modes};
 use crate::chain::point::Point;
-use crate::effects::{Block, Effect, FreeOrder, Place, Signature};
+use crate::effects::{Block, Effect, FreeOrder, InnerLoop, Law, Place, Signature};
 use crate::fit::line_modes::line_modes;
 use crate::fit::memory::Memory;
 use crate::fit::minimize::Fitted;
@@ -135,10 +135,22 @@ fn is_mode(state: &SearchState, trial: &Trial) -> Result<bool, Error> {
 /// Why no machine can have the effect at a place, if so.
 fn impossible(point: &Point, place: usize) -> Option<Refusal> {
     let effect = &point.effects[place];
-    if matches!(effect.place(), Place::Loops(_)) && !point.dynamics.has_resonance() {
-        return Some(Refusal::NoResonance);
+    if let Place::Loops(closed) = effect.place() {
+        if !point.dynamics.has_resonance() {
+            return Some(Refusal::NoResonance);
+        }
+        if closed.loops().iter().any(|inner| adds_energy(point, inner)) {
+            return Some(Refusal::Impossible);
+        }
     }
     (!effect.block().is_none_or(Block::is_possible)).then_some(Refusal::Impossible)
+}
+
+/// Whether a loop is a force with beta > 0 that follows the displacement instead of opposing it: each cycle would add energy.
+fn adds_energy(point: &Point, inner: &InnerLoop) -> bool {
+    let gains = |drives: &[f64]| Some(point.dynamics.gains_from_states(drives));
+    let is_dissipative = matches!(inner.law, Law::BoucWen { .. });
+    is_dissipative && inner.relative_force(gains).is_some_and(|force| force <= 0.0)
 }
 
 /// Where the newest effect of a name stands.

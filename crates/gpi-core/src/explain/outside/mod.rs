@@ -53,6 +53,21 @@ pub(super) fn integrates(record: &Record, policy: &OutsidePolicy) -> Result<bool
     Ok(ratios.any(|ratio| ratio > policy.integrated))
 }
 
+/// Whether any output stands at a limit while the input moves, and a model with these residuals errs more there than
+/// elsewhere.
+pub(super) fn saturates(
+    record: &Record,
+    residuals: &[Matrix],
+    policy: &OutsidePolicy,
+) -> Result<bool, Error> {
+    let scaled = Units::of(record).scaled(record)?;
+    let of = |output| {
+        let clipped = saturation::clipped(&scaled, output, policy);
+        saturation::is_unexplained(&clipped, residuals, output)
+    };
+    Ok((0..scaled.outputs().len()).any(of))
+}
+
 /// Asks all questions.
 pub(super) fn outside(of: &Situation, policy: &OutsidePolicy) -> Result<Answer, Error> {
     let rivals = RivalPolicy::default();

@@ -1,0 +1,104 @@
+//! A restoring force with hysteresis.
+//!
+//! Bouc and Wen's force acts inside the mechanics, (E7) in the documentation's theory: `x+ = A x + B v + E w`,
+//! `dw = dz - (beta |dz| w + gamma dz |w|)`, `z = S x + T v`. As a force that opposes the displacement it makes the
+//! mechanics stiff for small motion and softer (or, for gamma < -beta, stiffer) for large motion, and it dissipates
+//! energy whatever the speed. With gamma = 0 it is Dahl's friction, which slides once the displacement has moved by several
+//! times 1 / beta.
+
+use super::loop_values;
+use super::properties::{FreeOrder, SeparatedBy, Signature};
+use super::{
+    Block, ClosedLoops, InnerLoop, Law, Proposal, Quantity, Sees, Situation, Stage, Units,
+};
+
+/// A loop around G through Bouc and Wen's force.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct HystereticStiffness {
+    /// The loops, at least one.
+    pub loops: Vec<InnerLoop>,
+}
+
+impl HystereticStiffness {
+    pub(super) const NAME: &'static str = "hysteretic-stiffness";
+    pub(super) const WHAT: &'static str =
+        "hysteretic stiffness: the restoring force inside the mechanics has hysteresis";
+    pub(super) const SYNONYMS: &'static [&'static str] =
+        &["bouc-wen", "hysteretic spring", "hysteretic damping", "elastoplastic"];
+    pub(super) const STAGE: Stage = Stage::Dynamics;
+    pub(super) const DRIVEN: bool = true;
+    pub(super) const REPEATS: bool = false;
+    pub(super) const SIGNATURE: Signature = Signature::ShapeOfCycle;
+    pub(super) const FREE_ORDER: FreeOrder = FreeOrder::Independent;
+    pub(super) const SEPARATED_BY: SeparatedBy = SeparatedBy::Levels;
+    pub(super) const SHOWN_BY: &'static [&'static str] = &["amplitude", "level-to-level"];
+    pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
+    pub(super) const IS_EXPANSION: bool = false;
+
+    pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
+        /// beta times the root mean square of z: half of it, and a force that saturates within each stroke. The fit
+        /// finds gamma, and beta from either.
+        const SHARPNESS: [f64; 2] = [0.5, 4.0];
+        // a first-order lag has no mass that a force could act on
+        if situation.dynamics.order() < 2 || situation.outputs().len() > 1 {
+            return Vec::new();
+        }
+        let (order, rms) = (situation.dynamics.order(), situation.rms(0));
+        if rms <= 0.0 {
+            return Vec::new();
+        }
+        let around = |sharpness: f64| {
+            let law = Law::BoucWen { beta: sharpness / rms, gamma: 0.0 };
+            let inner = InnerLoop { sees: Sees::Output(0), law, drives: vec![0.0; order] };
+            Proposal::linear(HystereticStiffness { loops: vec![inner] }, 0..order)
+        };
+        SHARPNESS.map(around).to_vec()
+    }
+}
+
+impl Block for HystereticStiffness {
+    fn values(&self) -> Vec<f64> {
+        loop_values::values(&self.loops)
+    }
+
+    fn set(&mut self, values: &[f64]) {
+        loop_values::set(&mut self.loops, values);
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        vec![1e-6; self.values().len()]
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        loop_values::bounds(&self.loops)
+    }
+
+    fn quantities(&self, units: Units) -> Vec<Quantity> {
+        loop_values::quantities(&self.loops, units)
+    }
+
+    /// Without beta, the force depends on the displacement alone.
+    fn is_possible(&self) -> bool {
+        self.loops
+            .iter()
+            .all(|inner| !matches!(inner.law, Law::BoucWen { beta, .. } if beta <= 0.0))
+    }
+}
+
+impl ClosedLoops for HystereticStiffness {
+    fn loops(&self) -> &[InnerLoop] {
+        &self.loops
+    }
+
+    fn loops_mut(&mut self) -> &mut [InnerLoop] {
+        &mut self.loops
+    }
+
+    fn in_steady_state(
+        &self,
+        units: Units,
+        relative_force: &dyn Fn(&InnerLoop) -> Option<f64>,
+    ) -> Vec<Quantity> {
+        loop_values::in_steady_state(&self.loops, units, relative_force)
+    }
+}

@@ -1,0 +1,170 @@
+//! The values of loops around G: what is estimated, in which limits, and what it is called.
+//!
+//! The values of a loop are its column of E, its rows of S and T, and those of its law: the logarithms of the half-widths
+//! of stops and their weights, or beta and gamma. The product of E, the scale of the signal and the scale of w is what the
+//! output shows; therefore the largest element of S and T, or the widest half-width and the last weight of stops, are held.
+
+use super::{InnerLoop, Law, Quantity, Sees, Units};
+
+/// Values of a loop that have the same form.
+enum Group<'a> {
+    /// The numbers themselves.
+    Plain(&'a mut [f64]),
+    /// The logarithms of positive numbers.
+    Logarithms(&'a mut [f64]),
+}
+
+/// The values of a loop, in order.
+fn groups(inner: &mut InnerLoop) -> Vec<Group<'_>> {
+    let mut groups = vec![Group::Plain(&mut inner.drives)];
+    if let Sees::Mixture { states, inputs } = &mut inner.sees {
+        groups.extend([Group::Plain(states), Group::Plain(inputs)]);
+    }
+    match &mut inner.law {
+        Law::Power { .. } => {}
+        Law::Stops { half_widths, weights } => {
+            groups.extend([Group::Logarithms(half_widths), Group::Plain(weights)]);
+        }
+        Law::BoucWen { beta, gamma } => {
+            groups.extend([beta, gamma].map(|own| Group::Plain(std::slice::from_mut(own))));
+        }
+    }
+    groups
+}
+
+/// The values of all loops, in order.
+pub(super) fn values(loops: &[InnerLoop]) -> Vec<f64> {
+    let mut values = Vec::new();
+    for inner in &mut loops.to_vec() {
+        for group in groups(inner) {
+            match group {
+                Group::Plain(own) => values.extend(own.iter().copied()),
+                Group::Logarithms(own) => values.extend(own.iter().map(|value| value.ln())),
+            }
+        }
+    }
+    values
+}
+
+/// Takes other values, as many as [`values`] returns.
+pub(super) fn set(loops: &mut [InnerLoop], values: &[f64]) {
+    let mut rest = values.iter().copied();
+    for group in loops.iter_mut().flat_map(groups) {
+        match group {
+            Group::Plain(own) => {
+                own.iter_mut().zip(&mut rest).for_each(|(own, new)| *own = new);
+            }
+            Group::Logarithms(own) => {
+                own.iter_mut().zip(&mut rest).for_each(|(own, new)| *own = new.exp());
+            }
+        }
+    }
+}
+
+/// Smallest and largest sensible value of each.
+pub(super) fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
+    let free = |count: usize| vec![(f64::NEG_INFINITY, f64::INFINITY); count];
+    let mut bounds = Vec::new();
+    for inner in loops {
+        bounds.extend(free(inner.drives.len()));
+        if let Sees::Mixture { states, inputs } = &inner.sees {
+            let seen = || states.iter().chain(inputs);
+            bounds.extend(free(states.len() + inputs.len()));
+            let largest =
+                seen().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+            let is_held = !matches!(&inner.law, Law::Stops { .. });
+            // the scale of z is in the drives as well, and in beta and gamma
+            if let Some((place, value)) = largest.filter(|_| is_held) {
+                let first = bounds.len() - seen().count();
+                bounds[first + place] = (value, value);
+            }
+        }
+        if let Law::BoucWen { .. } = &inner.law {
+            bounds.extend([(0.0, f64::INFINITY), (f64::NEG_INFINITY, f64::INFINITY)]);
+        }
+        if let Law::Stops { half_widths, weights } = &inner.law {
+            /// Largest distance of a half-width from the widest one, in logarithms: a factor of a thousand.
+            const REACH: f64 = 6.9;
+            /// The largest step of a logarithm or a weight.
+            const STEP: f64 = 0.7;
+            let near = |value: f64| (value - STEP, value + STEP);
+            // the widest stop sets the scales of z and of w
+            let held = |last: Option<f64>| last.map(|value| (value, value));
+            let widest = half_widths.last().map(|r| r.ln());
+            let others = half_widths.len().saturating_sub(1);
+            let width = |r: &f64| {
+                let (low, high) = near(r.ln());
+                let scale = widest.unwrap_or(0.0);
+                (low.max(scale - REACH), high.min(scale + REACH))
+            };
+            bounds.extend(half_widths.iter().take(others).map(width));
+            bounds.extend(held(widest));
+            bounds.extend(weights.iter().take(others).map(|weight| near(*weight)));
+            bounds.extend(held(weights.last().copied()));
+        }
+    }
+    bounds
+}
+
+/// The numbers that describe the loops.
+pub(super) fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
+    let mut found = Vec::new();
+    for (q, inner) in loops.iter().enumerate() {
+        let mut list = |what: &str, values: &[f64], zero_is_absence: bool| {
+            let named = values.iter().enumerate();
+            let quantity = |(i, &value)| {
+                let name = format!("{what}[{q}][{i}]");
+                Quantity { zero_is_absence, ..Quantity::new(name, "", value) }
+            };
+            found.extend(named.map(quantity));
+        };
+        list("drive", &inner.drives, true);
+        if let Sees::Mixture { states, inputs } = &inner.sees {
+            list("seen_state", states, false);
+            list("seen_input", inputs, false);
+        }
+        if let Law::Stops { half_widths, weights } = &inner.law {
+            list("half_width", half_widths, false);
+            list("weight", weights, true);
+        }
+        if let Law::BoucWen { beta, gamma } = &inner.law {
+            // z is a displacement
+            let unit = Units::ratio("", units.output);
+            found.push(Quantity::strength(format!("beta[{q}]"), unit.clone(), *beta));
+            found.push(Quantity::strength(format!("gamma[{q}]"), unit, *gamma));
+        }
+    }
+    found
+}
+
+/// The forces of the loops in steady state, relative to the stiffness of the linear mechanics.
+///
+/// A power n of the displacement z adds `k_n z^n` to the linear force `k_1 z`; `kn_over_k1` is their ratio. The force of Bouc
+/// and Wen is `k_h w` with `w = z` for small motion; `hysteretic_over_linear` is `k_h / k_1`.
+pub(super) fn in_steady_state(
+    loops: &[InnerLoop],
+    units: Units,
+    relative_force: &dyn Fn(&InnerLoop) -> Option<f64>,
+) -> Vec<Quantity> {
+    let of = |(q, inner): (usize, &InnerLoop)| {
+        let force = relative_force(inner)?;
+        let (name, unit, value) = match &inner.law {
+            Law::Power { exponent, scale } => {
+                let unit = match (units.output, exponent - 1) {
+                    ("", _) => String::new(),
+                    (unit, 1) => format!("1/{unit}"),
+                    (unit, power) => format!("1/{unit}^{power}"),
+                };
+                let value = force * scale.powi(1 - exponent);
+                (format!("k{exponent}_over_k1"), unit, value)
+            }
+            Law::Stops { weights, .. } => {
+                let value = force * weights.iter().sum::<f64>();
+                (format!("hysteretic_over_linear[{q}]"), String::new(), value)
+            }
+            Law::BoucWen { .. } => (format!("hysteretic_over_linear[{q}]"), String::new(), force),
+        };
+        Some(Quantity::strength(name, unit, value))
+    };
+    loops.iter().enumerate().filter_map(of).collect()
+}

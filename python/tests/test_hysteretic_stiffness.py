@@ -1,0 +1,172 @@
+"""Bouc and Wen's force in a loop around G, against its differential equation in plain NumPy."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import gpi_hammerstein as gpi
+import oracle
+from exported_models import EFFECTS
+from plants import textbook
+from records import RATE, model_of
+from test_inner_loops import plant, wander, with_loops
+
+pytestmark = pytest.mark.xdist_group("inner loops")
+
+Array = NDArray[np.float64]
+DRIVES, BETA, GAMMA = np.array([0.02, -0.06, 0.01]), 0.5, -0.3
+
+
+def force_loop(drives: Array = DRIVES, beta: float = BETA, gamma: float = GAMMA) -> dict:
+    law = {"bouc-wen": {"beta": beta, "gamma": gamma}}
+    return {"sees": {"output": 0}, "law": law, "drives": list(drives)}
+
+
+def moved(w: float, dz: float, beta: float, gamma: float) -> float:
+    """Dw = dz - (beta |dz| w + gamma dz |w|), by 400 steps of the classical method of Runge and Kutta."""
+    step = dz / 400
+
+    def change(w: float) -> float:
+        return step - beta * abs(step) * w - gamma * step * abs(w)
+
+    for _ in range(400):
+        first = change(w)
+        second = change(w + first / 2)
+        third = change(w + second / 2)
+        w += (first + 2 * second + 2 * third + change(w + third)) / 6
+    return w
+
+
+def path(newest: float, before: float, older: float) -> list[float]:
+    """The last sample's extremes: those of the parabola through three samples, at t = 0, -1 and -2."""
+    parabola = np.polyfit([0.0, -1.0, -2.0], [newest, before, older], 2)
+    turn = -parabola[1] / (2 * parabola[0]) if abs(parabola[0]) > 1e-12 else 0.0
+    return [before, float(np.polyval(parabola, turn)), newest] if -1 < turn < 0 else [before, newest]
+
+
+def simulated(u: Array, loop: dict, own: oracle.Plant) -> Array:
+    """The plant with the loop, sample by sample."""
+    v = own.intermediate(u)
+    a, b, c, d = own.state_space()
+    x = np.linalg.solve(np.eye(len(a)) - a, b @ v[0])
+    beta, gamma = loop["law"]["bouc-wen"].values()
+    w, z = 0.0, [0.0, 0.0]
+    y = np.zeros((len(u), 2))
+    for k in range(len(u)):
+        y[k] = c @ x + d @ v[k]
+        for first, last in pairwise(path(y[k, 0], *z)):
+            w = moved(w, last - first, beta, gamma)
+        z = [y[k, 0], z[0]]
+        x = a @ x + b @ v[k] + np.array(loop["drives"]) * w
+    return y
+
+
+def test_the_force_obeys_its_differential_equation() -> None:
+    u, loop = wander(250), force_loop()
+    expected = simulated(u, loop, plant())
+    without = simulated(u, force_loop(0 * DRIVES), plant())
+    assert np.abs(expected - without).max() > 0.05
+    model = with_loops(model_of(plant()), loop)
+    # the method of Runge and Kutta errs by 4e-8 where w passes zero within a step
+    np.testing.assert_allclose(model.simulate(u), expected, rtol=0, atol=2e-7)
+
+
+def test_a_record_in_parts_is_the_whole() -> None:
+    model, u = with_loops(model_of(plant()), force_loop(), delay=1), wander()
+    state, pieces = model.start(u[0]), []
+    for piece in (u[:1], u[1:170], u[170:]):
+        y, state = model.run(piece, state)
+        pieces.append(y)
+    np.testing.assert_allclose(np.concatenate(pieces), model.simulate(u), rtol=0, atol=1e-12)
+
+
+def test_derivatives_go_through_the_force() -> None:
+    u = wander(400)
+    values = np.concatenate([DRIVES, [BETA, GAMMA]])
+
+    def model(values: Array) -> gpi.Model:
+        return with_loops(model_of(plant()), force_loop(values[:3], values[3], values[4]))
+
+    found = gpi.sensitivities(model(values), gpi.Record(u, model(values).simulate(u), rate=RATE))
+    names, step = list(found["names"]), 1e-6
+    for place in range(5):
+        there, back = (
+            np.asarray(model(values + sign * step * np.eye(5)[place]).simulate(u)) for sign in (1, -1)
+        )
+        for output in range(2):
+            expected = (there - back)[:, output] / (2 * step)
+            column = found["jacobians"][0][output][:, names.index(f"stiffness.value[{place}]")]
+            # a sample at which z turns within the step may differ
+            assert np.quantile(np.abs(column - expected), 0.97) <= 1e-5 * np.abs(expected).max(), place
+
+
+def test_a_negative_beta_is_refused() -> None:
+    with pytest.raises((gpi.DataError, gpi.ParameterError), match=r"beta = -0.1.* beta >= 0"):
+        with_loops(model_of(plant()), force_loop(beta=-0.1))
+
+
+def test_the_numbers_are_those_of_the_mechanics() -> None:
+    """Relative to the linear stiffness: what w = 1 moves in steady state, positive where it opposes."""
+    described = json.loads(with_loops(model_of(plant()), force_loop()).to_json())
+    described["effects"] = [{"name": "hysteretic-stiffness", **EFFECTS["hysteretic-stiffness"]}]
+    model = gpi.Model.from_json(json.dumps(described))
+    a, _, c, _ = plant().state_space()
+    drives = EFFECTS["hysteretic-stiffness"]["loops"][0]["drives"]
+    expected = -(c @ np.linalg.solve(np.eye(3) - a, drives))[0]
+    (effect,) = model.effects
+    found = {one["name"]: one["value"] for one in effect["parameters"]}
+    assert found["hysteretic_over_linear[0]"] == pytest.approx(expected, rel=1e-9)
+    assert (found["beta[0]"], found["gamma[0]"]) == (0.4, -0.5)
+
+
+def benchmark(samples: int, seed: int) -> tuple[Array, Array]:
+    """The equations of the public Bouc-Wen benchmark: u in N, y in mm, at 750 Hz.
+
+    2 y'' + 10 y' + 5e4 y + z = u, z' = 5e4 y' - 1e3 (0.8 |y'| z - 1.1 y' |z|), integrated at 15 kHz. From
+    https://www.nonlinearbenchmark.org (Noel and Schoukens).
+    """
+    random, steps = np.random.default_rng(seed), 20
+    lines = np.arange(int(5 / 750 * samples), int(150 / 750 * samples))
+    spectrum = np.zeros(samples * steps + 1, dtype=complex)
+    spectrum[lines] = np.exp(2j * np.pi * random.random(len(lines)))
+    fine = np.fft.irfft(spectrum, 2 * samples * steps)
+    fine *= 50 / fine.std()
+    y, speed, z, h = 0.0, 0.0, 0.0, 1 / 750 / steps
+    motion = np.zeros(samples)
+
+    def slopes(y: float, speed: float, z: float, u: float) -> tuple[float, float, float]:
+        dz = 5e4 * speed - 1e3 * (0.8 * abs(speed) * z - 1.1 * speed * abs(z))
+        return speed, (u - 10 * speed - 5e4 * y - z) / 2, dz
+
+    for k in range(samples * steps):
+        if k % steps == 0:
+            motion[k // steps] = 1e3 * y
+        a = slopes(y, speed, z, fine[2 * k])
+        b = slopes(y + h * a[0], speed + h * a[1], z + h * a[2], fine[(2 * k + 2) % len(fine)])
+        y, speed, z = (value + h * (p + q) / 2 for value, p, q in zip((y, speed, z), a, b, strict=True))
+    return fine[:: 2 * steps], motion
+
+
+def test_the_physics_of_the_public_benchmark_are_found() -> None:
+    u, y = benchmark(5000, 1)
+    noise = 0.005
+    y += np.random.default_rng(2).normal(0, noise, len(y))
+    found = gpi.explain(gpi.Record(u, y, rate=750.0))
+    assert found.effects == ["hysteretic-stiffness"]
+    assert found.after["holdout"]["rms"] < 1.15 * noise < 0.1 * found.before["holdout"]["rms"]
+    (step,) = (step for step in found.to_dict()["steps"] if step["effect"])
+    of = {name: own["value"] for name, own in step["parameters"].items()}
+    assert of["beta[0]"] == pytest.approx(0.8, rel=0.03)
+    assert of["gamma[0]"] == pytest.approx(-1.1, rel=0.03)
+    assert of["hysteretic_over_linear[0]"] == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.parametrize("stage", ["bouc-wen-spring", "dahl"])
+def test_forces_of_other_textbooks_are_named(stage: str) -> None:
+    record = textbook.draw(stage, 1002)
+    found = gpi.explain(gpi.Record(record.u, record.y, rate=record.rate))
+    assert found.effects == ["hysteretic-stiffness"]
+    assert found.after["holdout"]["rms"] < 0.05 * found.before["holdout"]["rms"]
