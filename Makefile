@@ -126,6 +126,9 @@ firmware-cost: $(NATIVE) ## Count a compensator's instructions on a Cortex-M4F i
 real-records: $(NATIVE) ## Print the held-out errors on measured records next to simple rivals (takes a long time)
 	$(BIN)/python tools/real_records.py --markdown docs/real-records.md
 
+public-benchmarks: $(NATIVE) ## Explain the public benchmarks and write docs/public-benchmarks.md (needs the data or a network)
+	$(BIN)/python tools/public_benchmarks.py --markdown docs/public-benchmarks.md
+
 scoreboard: $(NATIVE) ## Print how often `explain` names the right effects (takes a long time)
 	$(BIN)/python tools/scoreboard.py
 

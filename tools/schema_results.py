@@ -76,6 +76,12 @@ STEP = closed(
                 "deviance": maybe(number("what the effect took from the sum of squares, over its noise")),
                 "chance": maybe(number("what chance takes")),
                 "dropped": listed(text(), "effects that it replaced"),
+                "probability": maybe(
+                    size("that it predicts held-out blocks better than the alternatives; null without any")
+                ),
+                "alternatives": of(
+                    "object", "other effects that would be accepted", additionalProperties=size()
+                ),
             }
         ),
         "train_rms": maybe(size()),
@@ -97,6 +103,7 @@ STAGE = closed(
             )
         ),
         "first_resonance": maybe(closed({"frequency_hz": size(), "damping": number()})),
+        "without": listed(text(), "effects that are forces inside the mechanics"),
     }
 )
 EXPLANATION_PARTS: dict[str, Schema] = {
@@ -116,6 +123,7 @@ EXPLANATION_PARTS: dict[str, Schema] = {
                 "holdout_rms": maybe(size()),
                 "why": text(),
                 "confounded_with": listed(text()),
+                "probability": maybe(size("that it predicts better than the others that would be accepted")),
             }
         )
     ),
@@ -226,4 +234,21 @@ STEERING_MIRROR = closed(
         "files": FILES,
     }
 )
-REPRODUCTION: Schema = {"oneOf": [PAPER, STEERING_MIRROR]}
+BEFORE_AND_AFTER = closed({"before": size(), "after": size()})
+PUBLIC_BENCHMARK = closed(
+    {
+        "schema": {"const": "gpi-reproduction/1"},
+        "example": {"enum": ["silverbox", "bouc-wen", "emps", "cascaded-tanks", "friction-damper"]},
+        "title": text(),
+        "truth": text("what is known of the plant"),
+        "true_effects": listed(text()),
+        "false_names": listed(text(), "effects that were named and that the plant does not have"),
+        "unit": text("of the errors"),
+        "errors": of("object", "rms errors by part", additionalProperties=BEFORE_AND_AFTER),
+        "published": of("object", additionalProperties=of("object", additionalProperties=number())),
+        "seconds": size(),
+        "explanation": closed(EXPLANATION_PARTS),
+        "files": FILES,
+    }
+)
+REPRODUCTION: Schema = {"oneOf": [PAPER, STEERING_MIRROR, PUBLIC_BENCHMARK]}

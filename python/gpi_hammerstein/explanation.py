@@ -14,6 +14,8 @@ from gpi_hammerstein.uncertain import NOT_DETERMINED, spread
 SHOWN = 6
 # Largest number of wrong samples in one sentence.
 FEW = 4
+# Smallest probability of another effect that is mentioned.
+PROBABLE = 0.05
 
 __all__ = ["failed_in_words", "in_words", "to_dict"]
 
@@ -145,6 +147,8 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
             f"{large['swing']:.3g}{space} rms. An effect that acts only on the input, such as hysteresis, "
             "cannot move a resonance. It is therefore not the only cause."
         )
+    for step in result["steps"]:
+        yield from alternatives_in_words(step)
     for other in result["rejected"]:
         if other["confounded_with"]:
             yield f"{other['effect']} {other['why']}: this record cannot distinguish them."
@@ -173,6 +177,21 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
         yield f"Reason: {result['verdict_reason']}."
     if result["next_experiment"]:
         yield f"Next experiment: {result['next_experiment']['why']}."
+
+
+def alternatives_in_words(step: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a sentence with the probabilities of an effect and of others that would be accepted, if they matter."""
+    own = step["evidence"].get("probability")
+    others = step["evidence"].get("alternatives") or {}
+    probable = {name: value for name, value in others.items() if value >= PROBABLE}
+    if own is None or not probable:
+        return
+    ranked = sorted(probable.items(), key=lambda pair: -pair[1])
+    listed = ", ".join(f"{name} {100 * value:.0f} %" for name, value in [(step["effect"], own), *ranked])
+    yield (
+        "When it was added, other effects would also have been accepted. By the held-out blocks, the "
+        f"probabilities are: {listed}."
+    )
 
 
 def wrong_in_words(wrong: Sequence[Mapping[str, Any]]) -> str:

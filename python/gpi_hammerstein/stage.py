@@ -1,5 +1,6 @@
 """The main properties of a stage: sensitivity, width of the hysteresis loop, first resonance."""
 
+import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +15,8 @@ Range = tuple[float, float]  # lowest and highest value of an input
 BRANCH = 500
 # Largest number of pairs of input and output that are described by sentences.
 FEW = 2
+# Width of a loop, relative to the travel, below which it is rounding.
+ROUNDING = 1e-12
 # Damping ratio above which a pair of poles shows no peak in the frequency response.
 DAMPED = 0.7
 
@@ -22,7 +25,7 @@ def stage(model: Model, record: Record) -> dict[str, Any]:
     """Return the main properties of a stage, for the range of a record's inputs.
 
     The loop is that of slow motion over the range of each input. It contains the hysteresis and the DC gain
-    of the linear part, ``G(1) v``. It does not contain effects such as creep.
+    of the linear part, ``G(1) v``. It does not contain effects such as creep, or forces inside the mechanics.
 
     Parameters
     ----------
@@ -37,7 +40,8 @@ def stage(model: Model, record: Record) -> dict[str, Any]:
         ``loops``, a list of ``input``, ``output``, ``range``, ``sensitivity`` (change of the output over
         change of the input, over the whole range, in ``unit``) and ``width`` (the largest opening of the loop
         over the travel of the output); ``first_resonance`` with ``frequency_hz`` and ``damping``, or None if
-        no pair of poles has a damping ratio below 0.7.
+        no pair of poles has a damping ratio below 0.7; ``without``, the effects that are forces inside the
+        mechanics, which change the sensitivity and the resonance.
 
     Examples
     --------
@@ -46,7 +50,13 @@ def stage(model: Model, record: Record) -> dict[str, Any]:
     {'frequency_hz': 812.3, 'damping': 0.021}
     """
     found = loops(model, input_ranges(record), model.linear.dc_gain)
-    return {"loops": found, "first_resonance": first_resonance(model)}
+    return {"loops": found, "first_resonance": first_resonance(model), "without": inner_forces(model)}
+
+
+def inner_forces(model: Model) -> list[str]:
+    """Return the names of the effects that are forces inside the mechanics."""
+    described = json.loads(model.to_json()).get("effects", [])
+    return sorted({effect["name"] for effect in described if "loops" in effect})
 
 
 def input_ranges(record: Record) -> list[Range]:
@@ -72,6 +82,8 @@ def loops(model: Model, ranges: Sequence[Range | None], gain: NDArray[np.float64
         up, down = v[2 * BRANCH : 3 * BRANCH], v[3 * BRANCH :][::-1]
         travel = float(up[-1] - up[0])
         width = float(np.abs(down - up).max() / abs(travel)) if travel else 0.0
+        # rounding
+        width = width if width > ROUNDING else 0.0
         for o, (output, output_unit) in enumerate(zip(model.output_names, model.output_units, strict=True)):
             found.append(
                 {
@@ -109,19 +121,21 @@ def natural(pole: complex, rate: float) -> tuple[float, float]:
 def stage_in_words(found: dict[str, Any]) -> list[str]:
     """Return the properties as sentences: the pairs of channels, unless there are many, and the resonance."""
     loops = found["loops"] if len(found["loops"]) <= FEW else []
+    without = " and ".join(found["without"])
+    where = f"of the linear part, without {without}, " if without else ""
     sentences = []
     for one in loops:
         gain = f"{one['sensitivity']:.4g} {one['unit']}".rstrip()
         low, high = (f"{end:.4g}" for end in one["range"])
         ends = f"between {low} and {high} {one['unit'].partition('/')[2]}".rstrip()
         sentences.append(
-            f"For slow motion, the sensitivity from {one['input']} to {one['output']} is {gain} {ends}. "
-            f"The width of the hysteresis loop is {100 * one['width']:.2g} % of the travel."
+            f"For slow motion, the sensitivity {where}from {one['input']} to {one['output']} is {gain} "
+            f"{ends}. The width of the hysteresis loop is {100 * one['width']:.2g} % of the travel."
         )
     resonance = found["first_resonance"]
     if resonance:
         sentences.append(
-            f"The first resonance is at {resonance['frequency_hz']:.4g} Hz with a damping of "
+            f"The first resonance {where}is at {resonance['frequency_hz']:.4g} Hz with a damping of "
             f"{resonance['damping']:.2g}."
         )
     return sentences

@@ -13,6 +13,7 @@ import pytest
 
 import gpi_hammerstein as gpi
 from gpi_hammerstein.cli import EXAMPLES, run
+from gpi_hammerstein.reproduce.catalogue import BENCHMARKS
 from records import RATE, good_columns, write_csv
 
 FIGURES = {"rms", "nrmse", "fit_percent", "max"}
@@ -388,7 +389,7 @@ COMMANDS = [
     *([command.__name__] for command in EXAMPLES),
     *(["excite", kind] for kind in ("multisine", "prbs", "triangle", "steps")),
     *(["datasets", one] for one in ("list", "fetch")),
-    *(["reproduce", one] for one in ("paper", "fsm")),
+    *(["reproduce", one] for one in ("paper", "fsm", *BENCHMARKS)),
 ]
 
 

@@ -68,7 +68,7 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
             && is_superfluous(lost, threshold, [&held_out, &trial.held_out], factor)
         {
             let dropped = vec![slow.name];
-            state.add(Addition { trial, others: Vec::new(), dropped })?;
+            state.add(Addition { trial, others: Vec::new(), probability: None, dropped })?;
             // the grids were placed, and the effect's terms counted, beside the slow function
             state.is_rich = false;
             is_replaced = true;
@@ -171,7 +171,7 @@ pub(super) fn exchange_slow(state: &mut SearchState, progress: Progress) -> Resu
         let lost = lost(state, &trial, &held_out) + price;
         if -lost > 2.0 * state.setup.policy.judgement.looks.ln() {
             let dropped = vec![own.name];
-            state.add(Addition { trial, others: Vec::new(), dropped })?;
+            state.add(Addition { trial, others: Vec::new(), probability: None, dropped })?;
         }
     }
     Ok(())

@@ -32,6 +32,11 @@ pub struct Step {
     pub chance: f64,
     /// Effects that this one made superfluous.
     pub dropped: Vec<&'static str>,
+    /// How probable it is, by the held-out blocks, that it predicts better than the other effects of its round that would also
+    /// be accepted; `None` where there are none.
+    pub probability: Option<f64>,
+    /// These other effects, with their probabilities.
+    pub alternatives: Vec<(&'static str, f64)>,
     /// Root mean square error on the training data.
     pub train_rms: f64,
     /// Root mean square error on the held-out blocks.
@@ -228,6 +233,8 @@ fn declared(before: &Errors) -> Step {
         deviance: 0.0,
         chance: 0.0,
         dropped: Vec::new(),
+        probability: None,
+        alternatives: Vec::new(),
         train_rms: before.train.rms,
         holdout_rms: before.holdout.rms,
     }
@@ -243,9 +250,16 @@ fn added(addition: &Addition, setup: &SearchSetup, values: f64) -> Step {
         deviance: trial.deviance,
         chance: trial.threshold,
         dropped: addition.dropped.clone(),
+        probability: addition.probability,
+        alternatives: addition.others.iter().filter_map(probable).collect(),
         train_rms: (trial.cost / values).sqrt(),
         holdout_rms: setup.holdout_rms(&trial.held_out),
     }
+}
+
+/// The name and the probability of another effect that would be accepted.
+fn probable(other: &Rejected) -> Option<(&'static str, f64)> {
+    other.probability.map(|probability| (other.effect, probability))
 }
 
 fn of_noise(effect: &Effect, after: &Errors) -> Step {

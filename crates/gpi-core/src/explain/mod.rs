@@ -26,6 +26,7 @@ mod moved_resonance;
 mod noise;
 mod outside;
 mod policy;
+mod probability;
 mod projection;
 mod ranking;
 mod repair;

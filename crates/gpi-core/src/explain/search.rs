@@ -3,7 +3,8 @@
 use super::examination::{doubt, examine};
 use super::exchange::{exchange_slow, prefer_driven};
 use super::grid::refine_grids;
-use super::judgement::{Evidence, Refusal, choose, refusal};
+use super::judgement::{Evidence, Refusal, choose, judge, refusal};
+use super::probability::probabilities;
 use super::ranking::{ranked, scored_beside};
 use super::revision::{drop_superfluous, rearrange, shed_lags, shed_lines, straighten};
 use super::setup::SearchSetup;
@@ -57,7 +58,8 @@ fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
         state.remove(place, progress)?;
         let why = why.in_words("the model");
         let (effect, confounded_with) = (entry.name, Vec::new());
-        state.refused.push(Rejected { effect, holdout_rms, why, confounded_with });
+        let probability = None;
+        state.refused.push(Rejected { effect, holdout_rms, why, confounded_with, probability });
         if let Some(own) = state.additions.iter().rposition(|one| one.trial.entry.name == effect) {
             state.additions.remove(own);
         }
@@ -112,9 +114,18 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
         let refusal = refusal(&evidences[place], taken.map(|taken| &evidences[taken]), judgement);
         rejected(state.setup, &trials[place], refusal, taken.map(|taken| &trials[taken]))
     };
-    let others = (0..trials.len()).filter(|&place| Some(place) != taken).map(reject);
-    let others = others.chain(failed.into_iter().map(|one| failure(state.setup, one, &before)));
-    let others: Vec<Rejected> = others.collect();
+    let rest = || (0..trials.len()).filter(|&place| Some(place) != taken);
+    let mut others: Vec<Rejected> = rest().map(reject).collect();
+    let probability = taken.and_then(|taken| {
+        let accepted = |&place: &usize| judge(&evidences[place], judgement).is_ok();
+        let rivals: Vec<&[f64]> =
+            rest().filter(accepted).map(|place| &trials[place].held_out[..]).collect();
+        let (own, of_others) = probabilities(&trials[taken].held_out, &rivals)?;
+        let accepted = others.iter_mut().zip(rest()).filter(|(_, place)| accepted(place));
+        accepted.zip(of_others).for_each(|((other, _), of)| other.probability = Some(of));
+        Some(own)
+    });
+    others.extend(failed.into_iter().map(|one| failure(state.setup, one, &before)));
     let Some(taken) = taken else {
         state.last = others;
         let Some(better) = better else { return Ok(false) };
@@ -125,7 +136,7 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     if trial.entry.free_order == FreeOrder::JoinsG && !state.setup.order_is_given {
         join_modes(&mut trial.point);
     }
-    state.add(Addition { trial, others, dropped: Vec::new() })?;
+    state.add(Addition { trial, others, probability, dropped: Vec::new() })?;
     // the grids were placed before this effect was known
     state.is_rich = false;
     rearrange(state, progress)?;
@@ -165,6 +176,7 @@ fn failure(setup: &SearchSetup, (entry, error): (&Entry, Error), before: &[f64])
         holdout_rms: setup.holdout_rms(before),
         why: format!("could not be fitted to this record ({error})"),
         confounded_with: Vec::new(),
+        probability: None,
     }
 }
 
@@ -176,6 +188,7 @@ fn rejected(setup: &SearchSetup, trial: &Trial, why: Refusal, taken: Option<&Tri
         holdout_rms: setup.holdout_rms(&trial.held_out),
         why: why.in_words(taken.unwrap_or("the model")),
         confounded_with: alike.into_iter().collect(),
+        probability: None,
     }
 }
 
@@ -198,5 +211,5 @@ pub(super) fn force(
     let trial = as_trial(progress, ("trials", entry.name), (0, 1), |progress| {
         trial(state, best, progress)
     })?;
-    state.add(Addition { trial, others: Vec::new(), dropped: Vec::new() })
+    state.add(Addition { trial, others: Vec::new(), probability: None, dropped: Vec::new() })
 }

@@ -58,6 +58,9 @@ pub struct Rejected {
     pub why: String,
     /// Effects that explain the same.
     pub confounded_with: Vec<&'static str>,
+    /// How probable it is that it predicts better than the others of its round that would be accepted; `None` where it would
+    /// not be accepted, or nothing else was.
+    pub probability: Option<f64>,
 }
 
 /// An effect that was added.
@@ -67,6 +70,8 @@ pub(super) struct Addition {
     pub trial: Trial,
     /// What was tried in the same round.
     pub others: Vec<Rejected>,
+    /// How probable it is that it predicts better than those of the others that would be accepted; `None` where there are none.
+    pub probability: Option<f64>,
     /// Earlier effects that this one made superfluous.
     pub dropped: Vec<&'static str>,
 }

@@ -112,7 +112,9 @@ impl Explanation {
     /// Rows of ``effect`` (None first), ``parameters`` (rows of ``name``, ``value`` and ``std`` in ``unit``, and ``unit``),
     /// ``evidence``, ``train_rms`` and ``holdout_rms`` (in the output's unit). ``evidence`` holds ``promised``, the fraction of
     /// the residual's sum of squares that the score test predicts; ``deviance`` and its significance threshold ``chance``, pure
-    /// numbers; and ``dropped``, the names of the effects that this one made superfluous.
+    /// numbers; ``dropped``, the names of the effects that this one made superfluous; ``probability``, how probable it is, by the
+    /// held-out blocks, that it predicts better than the other effects of its round that would also be accepted (None without
+    /// any); and ``alternatives``, the probabilities of these by their names.
     #[getter]
     fn steps<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         self.found.steps.iter().map(|step| rows::step(py, step)).collect()
@@ -141,7 +143,9 @@ impl Explanation {
 
     /// Effects that were tried and not accepted.
     ///
-    /// Rows of ``effect``, ``holdout_rms`` (in the output's unit), ``why``, ``confounded_with``.
+    /// Rows of ``effect``, ``holdout_rms`` (in the output's unit), ``why``, ``confounded_with``, and ``probability``: how
+    /// probable it is, by the held-out blocks, that it predicts better than the other effects of its round that would
+    /// also be accepted (None where it would not be accepted itself).
     #[getter]
     fn rejected<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         self.found.rejected.iter().map(|one| rows::rejected(py, one)).collect()

@@ -32,6 +32,12 @@ pub(super) fn step<'py>(py: Python<'py>, step: &core::Step) -> PyResult<Bound<'p
     evidence.set_item("deviance", step.deviance)?;
     evidence.set_item("chance", step.chance)?;
     evidence.set_item("dropped", step.dropped.clone())?;
+    evidence.set_item("probability", step.probability)?;
+    let alternatives = PyDict::new(py);
+    for (name, probability) in &step.alternatives {
+        alternatives.set_item(name, probability)?;
+    }
+    evidence.set_item("alternatives", alternatives)?;
     row.set_item("evidence", evidence)?;
     row.set_item("train_rms", step.train_rms)?;
     row.set_item("holdout_rms", step.holdout_rms)?;
@@ -57,6 +63,7 @@ pub(super) fn rejected<'py>(py: Python<'py>, one: &core::Rejected) -> PyResult<B
     row.set_item("holdout_rms", one.holdout_rms)?;
     row.set_item("why", &one.why)?;
     row.set_item("confounded_with", one.confounded_with.clone())?;
+    row.set_item("probability", one.probability)?;
     Ok(row)
 }
 

@@ -4,7 +4,9 @@ import typer
 
 from gpi_hammerstein.cli.help import Command, Group
 from gpi_hammerstein.cli.reproduce.paper import paper_command
+from gpi_hammerstein.cli.reproduce.public import command
 from gpi_hammerstein.cli.reproduce.steering_mirror import steering_mirror_command
+from gpi_hammerstein.reproduce.catalogue import BENCHMARKS
 
 reproduce: typer.Typer = typer.Typer(cls=Group, no_args_is_help=True, help="Reproduce published examples.")
 
@@ -16,3 +18,5 @@ def _examples() -> None:
 
 reproduce.command("paper", cls=Command)(paper_command)
 reproduce.command("fsm", cls=Command)(steering_mirror_command)
+for name in BENCHMARKS:
+    reproduce.command(name, cls=Command)(command(name))
