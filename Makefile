@@ -20,7 +20,7 @@ unexport PYTHONDONTWRITEBYTECODE
 heading = @printf '\n== %s ==\n' '$(1)'
 
 .DEFAULT_GOAL := help
-.PHONY: help programs demo test compile-rust lint lint-rust lint-python test-rust test-python test-slow bench bench-peers bench-scale docs notebooks figures monte-carlo tracking expected-errors firmware-cost real-records scoreboard blind-exam kill-writes fuzz-readers fuzz-models miri reliability clean FORCE
+.PHONY: help programs demo test compile-rust lint lint-rust lint-python test-rust test-python test-slow bench bench-peers bench-scale docs notebooks figures monte-carlo tracking expected-errors firmware-cost real-records public-benchmarks scoreboard blind-exam kill-writes fuzz-readers fuzz-models miri reliability clean FORCE
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile

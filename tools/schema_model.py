@@ -44,7 +44,17 @@ LOOP = closed(
             "oneOf": [
                 closed({"power": closed({"exponent": of("integer", minimum=2), "scale": size()})}),
                 closed({"stops": closed({"half_widths": listed(size()), "weights": numbers()})}),
-                closed({"bouc-wen": closed({"beta": size("1 over the unit of z"), "gamma": number()})}),
+                closed(
+                    {
+                        "bouc-wen": closed(
+                            {
+                                "beta": size("1 over the unit of z to the power of the exponent"),
+                                "gamma": number(),
+                                "exponent": of("number", minimum=1),
+                            }
+                        )
+                    }
+                ),
             ]
         },
         "drives": numbers("what the force adds to each state"),

@@ -180,7 +180,7 @@ def in_words(result: Mapping[str, Any], unit: str = "", *, numbers: bool = True)
 
 
 def alternatives_in_words(step: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a sentence with the probabilities of an effect and of others that would be accepted, if they matter."""
+    """Yield a sentence with the probabilities of an effect and of others that would be accepted."""
     own = step["evidence"].get("probability")
     others = step["evidence"].get("alternatives") or {}
     probable = {name: value for name, value in others.items() if value >= PROBABLE}

@@ -69,7 +69,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
         "loops": [
             {
                 "sees": {"output": 0},
-                "law": {"bouc-wen": {"beta": 0.4, "gamma": -0.5}},
+                "law": {"bouc-wen": {"beta": 0.4, "gamma": -0.3, "exponent": 1.4}},
                 "drives": [-0.03, 0.01, 0.002],
             }
         ]

@@ -8,7 +8,7 @@ from gpi_hammerstein.escaping import in_c
 from gpi_hammerstein.export.calls import Calls, used_parts
 from gpi_hammerstein.export.chain import Chain, chain_of
 from gpi_hammerstein.export.described import channels_said, facts_of, sizes, title_of, without_gaps
-from gpi_hammerstein.export.numerals import Precision, in_lines, numerals_of_c
+from gpi_hammerstein.export.numerals import Precision, in_lines, numerals_of_c, quadrature
 from gpi_hammerstein.export.templates import filled
 
 
@@ -54,6 +54,7 @@ def model_in_c(model: Model, precision: Precision, name: str) -> dict[str, str]:
         "largest": numerals.largest,
         "rate": numerals.written(chain.rate),
         "ln_two": numerals.written(float(np.log(2.0))),
+        **quadrature(numerals),
         "two_pi": numerals.written(2.0 * np.pi),
         "tables": "\n".join(calls.tables.values()),
         "hysteresis": "\n".join(hysteresis),

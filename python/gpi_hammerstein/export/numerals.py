@@ -54,6 +54,14 @@ class Numerals:
             )
 
 
+def quadrature(numerals: Numerals) -> dict[str, str]:
+    """Return nodes x^2 and weights 2 x w of Gauss's quadrature from 0 to 1, by the names in the templates."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    nodes = (nodes + 1) / 2
+    listed = {"nodes": nodes**2, "shares": nodes * weights}
+    return {name: numerals.listed(values) for name, values in listed.items()}
+
+
 def in_lines(each: list[str]) -> str:
     """Return a list of numbers, six in a line."""
     lines = [", ".join(each[i : i + 6]) for i in range(0, len(each), 6)]

@@ -148,7 +148,7 @@ BENCHMARKS: dict[str, Benchmark] = {
             title="Bouc-Wen: an oscillator with a hysteretic restoring force, simulated",
             truth="The restoring force is k y + z with alpha = k, beta gamma = 0.8 / mm and "
             "beta delta = -1.1 / mm; in the notation of hysteretic-stiffness, hysteretic_over_linear = 1, "
-            "beta = 0.8 and gamma = -1.1.",
+            "beta = 0.8, gamma = -1.1 and exponent 1.",
             effects=("hysteretic-stiffness",),
             unit="um",
             factor=1e3,

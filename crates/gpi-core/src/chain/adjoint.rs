@@ -22,7 +22,7 @@
 //! ```text
 //! 6'  ybar  = M' W e(k)
 //! 7'  xbar  = l,   vbar = B' l,   wbar = E' l,   l <- A' l
-//! 5'  (zbar, rbar) = law'^T wbar                      rbar: half-widths of stops, beta, gamma
+//! 5'  (zbar, rbar) = law'^T wbar                      rbar: half-widths of stops, beta, gamma, n
 //! 4'  l    += S' zbar,   vbar += T' zbar   or   ybar_o += zbar
 //! 3'  l    += C' ybar,   vbar += D' ybar
 //! 2'  bar of x_0 = l                                  at the end of the warm-up only

@@ -14,7 +14,7 @@
 //! | E_j of a loop | x_j | w | 1 |
 //! | S_j, T_i of a loop | z | x_j, v_i | 1 |
 //! | ln r of a stop | half-width | 1 | r |
-//! | beta, gamma of Bouc and Wen's force | itself | 1 | 1 |
+//! | beta, gamma, n of Bouc and Wen's force | itself | 1 | 1 |
 //! | weight of a stop | w | z - F, the stop | 1 |
 //!
 //! A is in observer form, so that a_j multiplies the first state only: `dA/da_j = -e_j e_1'`.

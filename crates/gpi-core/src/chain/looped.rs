@@ -30,7 +30,7 @@ fn stiffness() -> Stiffness {
             },
             InnerLoop {
                 sees: Sees::Output(0),
-                law: Law::BoucWen { beta: 0.6, gamma: -0.2 },
+                law: Law::BoucWen { beta: 0.6, gamma: -0.2, exponent: 1.5 },
                 drives: drives(0.03),
             },
         ],

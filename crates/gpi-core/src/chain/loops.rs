@@ -27,7 +27,7 @@
 //! which are the marks, are in [`super::bouc_wen`]. w(k) drives the states for sample k + 1 only, so that no
 //! loop is algebraic and all loops of a sample are evaluated independently of each other.
 
-use super::bouc_wen::Step;
+use super::bouc_wen::{Shape, Step};
 use super::lanes::{Lanes, NONE, add};
 use crate::effects::{InnerLoop, Law, Sees};
 use crate::linear::dot;
@@ -119,8 +119,9 @@ impl Law {
                 }
                 w
             }
-            Self::BoucWen { beta, gamma } => {
-                let step = Step::new(places[0], [z, places[1], places[2]], *beta, *gamma);
+            &Self::BoucWen { beta, gamma, exponent } => {
+                let shape = Shape { beta, gamma, exponent };
+                let step = Step::new(places[0], [z, places[1], places[2]], shape);
                 places.copy_from_slice(&[step.force, z, places[1]]);
                 marks.copy_from_slice(&step.slopes);
                 step.force
@@ -153,7 +154,8 @@ impl Law {
                 }
             }
             Self::BoucWen { .. } => {
-                let changes = [places[0], z, places[1], places[2], shape[0], shape[1]];
+                let [beta, gamma, exponent] = [shape[0], shape[1], shape[2]];
+                let changes = [places[0], z, places[1], places[2], beta, gamma, exponent];
                 for (mark, change) in marks.iter().zip(&changes) {
                     add(simd, &mut w, *mark, change);
                 }
@@ -190,7 +192,7 @@ impl Law {
             Self::BoucWen { .. } => {
                 let force = places[0] + w;
                 z += places[1] + marks[1] * force;
-                shape.copy_from_slice(&[marks[4] * force, marks[5] * force]);
+                shape.iter_mut().zip(&marks[4..]).for_each(|(own, mark)| *own = mark * force);
                 let older = [marks[2] * force + places[2], marks[3] * force];
                 places.copy_from_slice(&[marks[0] * force, older[0], older[1]]);
             }

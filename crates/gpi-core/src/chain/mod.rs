@@ -60,6 +60,7 @@ mod forward;
 pub(crate) mod free_run;
 pub(crate) mod hysteresis;
 pub(crate) mod injections;
+mod jet;
 mod lanes;
 #[cfg(test)]
 pub(crate) mod looped;

@@ -14,7 +14,7 @@
 //!
 //! law'(k) and M(k) are known from the pass forward: slopes of powers, which plays of stops slide, derivatives of a step
 //! of Bouc and Wen's force ([`super::loops`]), slopes of the output stage ([`super::sensing`]). dr are the injections at
-//! the half-widths of stops, at beta and at gamma. At the first
+//! the half-widths of stops, at beta, gamma and n. At the first
 //! sample the state is the steady state of its injections, `dx = (I - A)^-1 (B dv + i_x)`, because the chain was at
 //! rest at its first v before the record. The unknown part of the initial state enters as `dx_j += 1` at the end of the
 //! warm-up. For the unknowns E_j of a loop, i_x is w(0) there, although the simulated steady state contains no `E w`:

@@ -1,9 +1,9 @@
 //! A restoring force with hysteresis.
 //!
 //! Bouc and Wen's force acts inside the mechanics, (E7) in the documentation's theory: `x+ = A x + B v + E w`,
-//! `dw = dz - (beta |dz| w + gamma dz |w|)`, `z = S x + T v`. As a force that opposes the displacement it makes the
+//! `dw = dz - (beta |dz| w + gamma dz |w|) |w|^(n-1)`, z a displacement. As a force that opposes the displacement it makes the
 //! mechanics stiff for small motion and softer (or, for gamma < -beta, stiffer) for large motion, and it dissipates
-//! energy whatever the speed. With gamma = 0 it is Dahl's friction, which slides once the displacement has moved by several
+//! energy whatever the speed. With gamma = 0 and n = 1 it is Dahl's friction, which slides once the displacement has moved by several
 //! times 1 / beta.
 
 use super::loop_values;
@@ -48,7 +48,7 @@ impl HystereticStiffness {
             return Vec::new();
         }
         let around = |sharpness: f64| {
-            let law = Law::BoucWen { beta: sharpness / rms, gamma: 0.0 };
+            let law = Law::BoucWen { beta: sharpness / rms, gamma: 0.0, exponent: 1.0 };
             let inner = InnerLoop { sees: Sees::Output(0), law, drives: vec![0.0; order] };
             Proposal::linear(HystereticStiffness { loops: vec![inner] }, 0..order)
         };

@@ -47,15 +47,17 @@ pub enum Law {
         /// g_i; the last one is 1 and fixes the scale of w.
         weights: Vec<f64>,
     },
-    /// `dw = dz - (beta |dz| w + gamma dz |w|)`: the restoring force of Bouc and Wen with the exponent 1, which contains
-    /// Dahl's friction (gamma = 0).
+    /// `dw = dz - (beta |dz| w + gamma dz |w|) |w|^(n-1)`: the restoring force of Bouc and Wen, which contains Dahl's friction
+    /// (gamma = 0, n = 1).
     ///
     /// Y.-K. Wen, *Method for random vibration of hysteretic systems*, J. Eng. Mech. Div. ASCE 102, 1976.
     BoucWen {
-        /// By how much the force opposes a motion in either direction, in 1 over the unit of z.
+        /// By how much the force opposes a motion in either direction, in 1 over the unit of z to the power n.
         beta: f64,
-        /// By how much loading softens (gamma > 0) or stiffens (gamma < 0) it, in 1 over the unit of z.
+        /// By how much loading softens (gamma > 0) or stiffens (gamma < 0) it, in the unit of beta.
         gamma: f64,
+        /// n, at least 1: how suddenly the force reaches its limit.
+        exponent: f64,
     },
 }
 
@@ -69,9 +71,9 @@ impl Law {
         }
     }
 
-    /// The number of values to which w does not respond linearly: the half-widths of stops; beta and gamma.
+    /// The number of values to which w does not respond linearly: the half-widths of stops; beta, gamma and the exponent.
     pub(crate) fn shapes(&self) -> usize {
-        if let Self::BoucWen { .. } = self { 2 } else { self.memories() }
+        self.memories()
     }
 
     /// The number of weights of a sum.
@@ -84,7 +86,7 @@ impl Law {
         match self {
             Self::Power { .. } => 1,
             Self::Stops { half_widths, .. } => half_widths.len().max(1),
-            Self::BoucWen { .. } => 6,
+            Self::BoucWen { .. } => 7,
         }
     }
 
@@ -149,6 +151,9 @@ impl InnerLoop {
             }
             Law::BoucWen { beta, .. } if beta.is_nan() || *beta < 0.0 => {
                 Some(format!("has beta = {beta}, but a force that dissipates energy has beta >= 0"))
+            }
+            Law::BoucWen { exponent, .. } if exponent.is_nan() || *exponent < 1.0 => {
+                Some(format!("has the exponent {exponent}, but it must be at least 1"))
             }
             _ => None,
         }

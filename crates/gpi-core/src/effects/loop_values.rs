@@ -1,7 +1,7 @@
 //! The values of loops around G: what is estimated, in which limits, and what it is called.
 //!
 //! The values of a loop are its column of E, its rows of S and T, and those of its law: the logarithms of the half-widths
-//! of stops and their weights, or beta and gamma. The product of E, the scale of the signal and the scale of w is what the
+//! of stops and their weights, or beta, gamma and the exponent. The product of E, the scale of the signal and the scale of w is what the
 //! output shows; therefore the largest element of S and T, or the widest half-width and the last weight of stops, are held.
 
 use super::{InnerLoop, Law, Quantity, Sees, Units};
@@ -25,8 +25,9 @@ fn groups(inner: &mut InnerLoop) -> Vec<Group<'_>> {
         Law::Stops { half_widths, weights } => {
             groups.extend([Group::Logarithms(half_widths), Group::Plain(weights)]);
         }
-        Law::BoucWen { beta, gamma } => {
-            groups.extend([beta, gamma].map(|own| Group::Plain(std::slice::from_mut(own))));
+        Law::BoucWen { beta, gamma, exponent } => {
+            let all = [beta, gamma, exponent];
+            groups.extend(all.map(|own| Group::Plain(std::slice::from_mut(own))));
         }
     }
     groups
@@ -80,7 +81,10 @@ pub(super) fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
             }
         }
         if let Law::BoucWen { .. } = &inner.law {
+            /// Largest exponent: beyond, the force is that of a stop.
+            const SHARPEST: f64 = 4.0;
             bounds.extend([(0.0, f64::INFINITY), (f64::NEG_INFINITY, f64::INFINITY)]);
+            bounds.push((1.0, SHARPEST));
         }
         if let Law::Stops { half_widths, weights } = &inner.law {
             /// Largest distance of a half-width from the widest one, in logarithms: a factor of a thousand.
@@ -127,11 +131,15 @@ pub(super) fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
             list("half_width", half_widths, false);
             list("weight", weights, true);
         }
-        if let Law::BoucWen { beta, gamma } = &inner.law {
+        if let Law::BoucWen { beta, gamma, exponent } = &inner.law {
             // z is a displacement
-            let unit = Units::ratio("", units.output);
+            let unit = match units.output {
+                "" => String::new(),
+                unit => format!("1/{unit}^n"),
+            };
             found.push(Quantity::strength(format!("beta[{q}]"), unit.clone(), *beta));
             found.push(Quantity::strength(format!("gamma[{q}]"), unit, *gamma));
+            found.push(Quantity::new(format!("exponent[{q}]"), "", *exponent));
         }
     }
     found

@@ -212,7 +212,7 @@ settings! {
         /// Times that the input must exceed a limit of its speed where the model is far from the noise. By hand: as
         /// many as an experiment has held-out blocks, because with fewer some blocks cannot test the limit.
         exceedances: usize = 10, FROM_ONE;
-        /// Part of the squares that a hysteretic force in the mechanics may leave of those without it, where the model is far
+        /// Part of the squares of the best model without it that a hysteretic force in the mechanics may leave, where the model is far
         /// from the noise. On records of known truth false ones left 0.19 to 0.6, most true ones at most 0.03.
         left: f64 = 0.1, PART;
         /// Part by which the squares must fall for the model without a refused effect to be taken instead of the present one:

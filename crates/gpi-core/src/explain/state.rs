@@ -202,21 +202,31 @@ impl<'a> SearchState<'a> {
         self.repair()
     }
 
-    /// Takes the best model without one of its effects: fitted from where the effect left the rest, which may be far
-    /// from where the rest is alone, or one that the search had before with the same effects.
+    /// Takes the best model without one of its effects.
     pub(super) fn remove(&mut self, place: usize, progress: Progress) -> Result<(), Error> {
+        (self.point, self.cost) = self.best_without(place, progress)?;
+        Ok(())
+    }
+
+    /// The best model without one of its effects, and its squares: fitted from where the effect left the rest, which may be
+    /// far from where the rest is alone, or one that the search had before with the same effects.
+    pub(super) fn best_without(
+        &self,
+        place: usize,
+        progress: Progress,
+    ) -> Result<(Point, f64), Error> {
         let without = self.point.without_effect(place);
         let names = |point: &Point| point.effects.iter().map(Effect::name).collect::<BTreeSet<_>>();
         let wanted = names(&without);
         let fitted = self.fit(without, &self.setup.options, "without it", progress)?;
-        (self.point, self.cost) = (fitted.point, fitted.linearization.cost);
+        let mut best = (fitted.point, fitted.linearization.cost);
         for known in self.left.iter().filter(|known| names(known) == wanted) {
             let cost = self.training_squares(known)?;
-            if cost < self.cost {
-                (self.point, self.cost) = (known.clone(), cost);
+            if cost < best.1 {
+                best = (known.clone(), cost);
             }
         }
-        Ok(())
+        Ok(best)
     }
 
     /// Finds isolated outliers of the residual and replaces them, also where the record is held out: a wrong sample

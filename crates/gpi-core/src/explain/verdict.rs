@@ -192,14 +192,13 @@ mod tests {
     }
 
     fn confused(effect: &'static str, with: &'static str) -> NextExperiment {
-        let rejected =
-            Rejected {
-                effect,
-                holdout_rms: 1.0,
-                why: String::new(),
-                confounded_with: vec![with],
-                probability: None,
-            };
+        let rejected = Rejected {
+            effect,
+            holdout_rms: 1.0,
+            why: String::new(),
+            confounded_with: vec![with],
+            probability: None,
+        };
         next_experiment(
             &[rejected],
             &[with],

@@ -214,38 +214,75 @@ static real stops(real *places, real z, const real *widths, const real *weights,
 
 @end
 @bouc_wen
-/* The force w behind a change of z in one direction: dw = dz - (beta |dz| w + gamma dz |w|). */
-static real changed(real w, real dz, real beta, real gamma)
+/* g to a power, for g >= 0. */
+static real power_of(real g, real exponent)
 {
-    const real sign = dz < 0 ? -1 : 1;
-    real length = dz * sign, k = beta + gamma, kept;
-    if (w * sign < 0) {
-        /* unloading, as far as zero or the end of the change */
-        const real opposing = beta - gamma, x = -opposing * w * sign;
-        real to_zero = length;
-        if (x > -1)
-            to_zero = x * x < (real)1e-16 ? -w * sign : log_of_one_plus(x) / opposing;
-        if (to_zero < length) {
-            length -= to_zero;
-            w = 0;
-        } else
-            k = opposing;
+    if (!(g > 0))
+        return 0;
+    return exponent < 1 || exponent > 1 ? 1 + exp_less_one(exponent * log_of_one_plus(g - 1)) : g;
+}
+
+/* dg/dl = direction - k g^exponent over a length, by the method of Runge and Kutta. */
+static real grown(real g, real length, real k, real exponent, real direction)
+{
+    const real most = direction > 0 ? g + length : g;
+    real stiff = exponent * k * length * (exponent > 1 ? power_of(most, exponent - 1) : 1) * 20;
+    int steps, n;
+    if (stiff < 0)
+        stiff = -stiff;
+    steps = (stiff < 99 ? (int)stiff : 99) + 1;
+    /* shortest near zero, where g^exponent bends */
+    steps += 2;
+    for (n = 0; n < steps; ++n) {
+        const int part = direction > 0 ? n : steps - 1 - n;
+        const real h = length * (2 * part + 1) / ((real)steps * steps);
+        const real first = direction - k * power_of(g, exponent);
+        const real second = direction - k * power_of(g + h / 2 * first, exponent);
+        const real third = direction - k * power_of(g + h / 2 * second, exponent);
+        const real last = direction - k * power_of(g + h * third, exponent);
+        g += h / 6 * (first + 2 * (second + third) + last);
     }
-    kept = exp_less_one(-k * length);
-    w += w * kept;
-    return w + sign * (k * k * length * length < (real)1e-16 ? length : -kept / k);
+    return g;
+}
+
+/* The force w behind a change of z in one direction: dw = dz - (beta |dz| w + gamma dz |w|) |w|^(exponent - 1). */
+static real changed(real w, real dz, real beta, real gamma, real exponent)
+{
+    /* Gauss's quadrature from 0 to 1 */
+    static const real nodes[] = {$nodes};
+    static const real shares[] = {$shares};
+    const real sign = dz < 0 ? -1 : 1;
+    real length = dz * sign, size = w * sign;
+    if (size < 0) {
+        /* unloading, as far as zero or the end of the change */
+        const real k = beta - gamma;
+        real to_zero = 0;
+        int n;
+        size = -size;
+        if (1 + k * power_of(size, exponent) > 0)
+            for (n = 0; n < 8; ++n)
+                to_zero += size * shares[n] / (1 + k * power_of(size * nodes[n], exponent));
+        else
+            to_zero = length;
+        if (to_zero >= length)
+            return -sign * grown(size, length, k, exponent, -1);
+        length -= to_zero;
+        size = 0;
+    }
+    return sign * grown(size, length, beta + gamma, exponent, 1);
 }
 
 /* The force at a sample: z turns back where the parabola through its last three samples does. */
-static real bouc_wen(real *memory, real z, real beta, real gamma)
+static real bouc_wen(real *memory, real z, real beta, real gamma, real exponent)
 {
     const real before = memory[1];
     const real slope = (3 * z - 4 * before + memory[2]) / 2, curvature = z - 2 * before + memory[2];
     real turn = before;
-    if (slope * curvature > 0 && slope * slope < curvature * curvature)
+    if (slope * curvature > 0 && slope * slope < curvature * curvature) {
         turn = z - slope * slope / curvature / 2;
-    memory[0] = changed(memory[0], turn - before, beta, gamma);
-    memory[0] = changed(memory[0], z - turn, beta, gamma);
+        memory[0] = changed(memory[0], turn - before, beta, gamma, exponent);
+    }
+    memory[0] = changed(memory[0], z - turn, beta, gamma, exponent);
     memory[2] = before;
     memory[1] = z;
     return memory[0];

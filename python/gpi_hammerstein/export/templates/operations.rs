@@ -169,44 +169,75 @@ fn stops(places: &mut [Real], z: Real, widths: &[Real], weights: &[Real]) -> Rea
 @end
 @bouc_wen
 
-/// The force w behind a change of z in one direction: dw = dz - (beta |dz| w + gamma dz |w|).
-fn changed(mut w: Real, dz: Real, beta: Real, gamma: Real) -> Real {
-    let sign = if dz < 0.0 { -1.0 } else { 1.0 };
-    let (mut length, mut k) = (dz * sign, beta + gamma);
-    if w * sign < 0.0 {
-        // unloading, as far as zero or the end of the change
-        let opposing = beta - gamma;
-        let x = -opposing * w * sign;
-        let to_zero = if x <= -1.0 {
-            length
-        } else if x * x < 1e-16 {
-            -w * sign
-        } else {
-            log_of_one_plus(x) / opposing
-        };
-        if to_zero < length {
-            length -= to_zero;
-            w = 0.0;
-        } else {
-            k = opposing;
-        }
+/// g to a power, for g >= 0.
+fn power_of(g: Real, exponent: Real) -> Real {
+    if g <= 0.0 {
+        0.0
+    } else if exponent < 1.0 || exponent > 1.0 {
+        1.0 + exp_less_one(exponent * log_of_one_plus(g - 1.0))
+    } else {
+        g
     }
-    let kept = exp_less_one(-k * length);
-    w += w * kept;
-    w + sign * if k * k * length * length < 1e-16 { length } else { -kept / k }
+}
+
+/// dg/dl = direction - k g^exponent over a length, by the method of Runge and Kutta.
+fn grown(mut g: Real, length: Real, k: Real, exponent: Real, direction: Real) -> Real {
+    let most = if direction > 0.0 { g + length } else { g };
+    let bend = if exponent > 1.0 { power_of(most, exponent - 1.0) } else { 1.0 };
+    let stiff = (exponent * k * length * bend * 20.0).abs();
+    let steps = (if stiff < 99.0 { stiff as u8 } else { 99 }) + 3;
+    for step in 0..steps {
+        // shortest near zero, where g^exponent bends
+        let part = Real::from(if direction > 0.0 { step } else { steps - 1 - step });
+        let h = length * (2.0 * part + 1.0) / (Real::from(steps) * Real::from(steps));
+        let first = direction - k * power_of(g, exponent);
+        let second = direction - k * power_of(g + h / 2.0 * first, exponent);
+        let third = direction - k * power_of(g + h / 2.0 * second, exponent);
+        let last = direction - k * power_of(g + h * third, exponent);
+        g += h / 6.0 * (first + 2.0 * (second + third) + last);
+    }
+    g
+}
+
+/// The force w behind a change of z in one direction: dw = dz - (beta |dz| w + gamma dz |w|) |w|^(exponent - 1).
+fn changed(w: Real, dz: Real, beta: Real, gamma: Real, exponent: Real) -> Real {
+    // Gauss's quadrature from 0 to 1
+    const NODES: [Real; 8] = [$nodes];
+    const SHARES: [Real; 8] = [$shares];
+    let sign = if dz < 0.0 { -1.0 } else { 1.0 };
+    let (mut length, mut size) = (dz * sign, w * sign);
+    if size < 0.0 {
+        // unloading, as far as zero or the end of the change
+        let k = beta - gamma;
+        size = -size;
+        let mut to_zero = 0.0;
+        if 1.0 + k * power_of(size, exponent) > 0.0 {
+            for (node, share) in NODES.iter().zip(&SHARES) {
+                to_zero += size * share / (1.0 + k * power_of(size * node, exponent));
+            }
+        } else {
+            to_zero = length;
+        }
+        if to_zero >= length {
+            return -sign * grown(size, length, k, exponent, -1.0);
+        }
+        length -= to_zero;
+        size = 0.0;
+    }
+    sign * grown(size, length, beta + gamma, exponent, 1.0)
 }
 
 /// The force at a sample: z turns back where the parabola through its last three samples does.
-fn bouc_wen(memory: &mut [Real], z: Real, beta: Real, gamma: Real) -> Real {
+fn bouc_wen(memory: &mut [Real], z: Real, beta: Real, gamma: Real, exponent: Real) -> Real {
     let (before, older) = (memory[1], memory[2]);
     let slope = (3.0 * z - 4.0 * before + older) / 2.0;
     let curvature = z - 2.0 * before + older;
     let mut turn = before;
     if slope * curvature > 0.0 && slope * slope < curvature * curvature {
         turn = z - slope * slope / curvature / 2.0;
+        memory[0] = changed(memory[0], turn - before, beta, gamma, exponent);
     }
-    memory[0] = changed(memory[0], turn - before, beta, gamma);
-    memory[0] = changed(memory[0], z - turn, beta, gamma);
+    memory[0] = changed(memory[0], z - turn, beta, gamma, exponent);
     memory[2] = before;
     memory[1] = z;
     memory[0]

@@ -230,32 +230,48 @@ function [force, places] = law(own, signal, places)
 end
 
 function w = changed(own, w, dz)
-    % the force w behind a change of z in one direction: dw = dz - (beta |dz| w + gamma dz |w|)
+    % the force w behind a change of z in one direction: dw = dz - (beta |dz| w + gamma dz |w|) |w|^(exponent - 1)
+    nodes = [0.000394223874247, 0.010336130351846, 0.056279873509952, 0.166694745769052, ...
+        0.350129388264702, 0.581812283426281, 0.807002607765473, 0.960684080371783];
+    shares = [0.002009899851318, 0.022608759545903, 0.074421818131456, 0.148077506617691, ...
+        0.214606276760671, 0.239284827746431, 0.199772274907471, 0.099218636439059];
     direction = 1 - 2 * (dz < 0);
     distance = abs(dz);
-    k = own.beta + own.gamma;
-    if w * direction < 0
-        opposing = own.beta - own.gamma;
-        x = opposing * abs(w);
+    size_of = w * direction;
+    if size_of < 0
+        k = own.beta - own.gamma;
+        size_of = -size_of;
         to_zero = distance;
-        if abs(x) < 1e-8
-            to_zero = abs(w);
-        elseif x > -1
-            to_zero = log1p(x) / opposing;
+        if 1 + k * size_of ^ own.exponent > 0
+            to_zero = sum(size_of * shares ./ (1 + k * (size_of * nodes) .^ own.exponent));
         end
-        if to_zero < distance
-            distance = distance - to_zero;
-            w = 0;
-        else
-            k = opposing;
+        if to_zero >= distance
+            w = -direction * grown(own, size_of, distance, k, -1);
+            return
         end
+        distance = distance - to_zero;
+        size_of = 0;
     end
-    kept = expm1(-k * distance);
-    w = w * (1 + kept);
-    if abs(k * distance) < 1e-8
-        w = w + direction * distance;
-    else
-        w = w - direction * kept / k;
+    w = direction * grown(own, size_of, distance, own.beta + own.gamma, 1);
+end
+
+function g = grown(own, g, distance, k, direction)
+    most = max(g, g + direction * distance);
+    stiff = 20 * abs(own.exponent * k * distance * most ^ (own.exponent - 1));
+    steps = min(floor(stiff), 99) + 3;
+    slope = @(x) direction - k * max(x, 0) ^ own.exponent;
+    for n = 1:steps
+        % shortest near zero, where the power bends
+        part = n - 1;
+        if direction < 0
+            part = steps - n;
+        end
+        h = distance * (2 * part + 1) / steps ^ 2;
+        first = slope(g);
+        second = slope(g + h / 2 * first);
+        third = slope(g + h / 2 * second);
+        last = slope(g + h * third);
+        g = g + h / 6 * (first + 2 * (second + third) + last);
     end
 end
 

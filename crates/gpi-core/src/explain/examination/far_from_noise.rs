@@ -15,8 +15,8 @@
 //! - a limit of the input's speed that the input exceeds a few times only, because such a limit explains any error of the
 //!   response to a jump, whatever its cause;
 //! - a loop around dynamics whose output integrates the input, because it makes up for the integrator that G lacks;
-//! - a hysteretic force in such a loop that did not take most of the squares when it was added, because it resembles a
-//!   hysteresis before the dynamics.
+//! - a hysteretic force in such a loop that leaves more than a part of the squares of the best model without it, because it
+//!   resembles a hysteresis before the dynamics.
 //!
 //! A loop is not named, near the noise or not, where the output saturates and the model errs more there than elsewhere: it makes
 //! up for the limit.
@@ -26,17 +26,18 @@
 
 use super::contribution::contribution;
 use crate::chain::point::Point;
-use crate::effects::{ClosedLoops, Entry, FreeOrder, InnerLoop, Law, Place, Signature};
+use crate::effects::{FreeOrder, InnerLoop, Law, Place, Signature};
 use crate::explain::judgement::Refusal;
 use crate::explain::outside::{integrates, saturates};
 use crate::explain::state::SearchState;
-use crate::{Error, Experiment, Record};
+use crate::{Error, Experiment, Progress, Record};
 
 /// Why an effect whose model is far from the noise on what is held out is not named: it is large, or acts too rarely.
 pub(super) fn doubt(
     state: &SearchState,
     point: &Point,
     place: usize,
+    progress: Progress,
 ) -> Result<Option<Refusal>, Error> {
     let entry = point.effects[place].entry();
     let of = point.effects[place].place();
@@ -71,8 +72,8 @@ pub(super) fn doubt(
         if integrates(record, outside)? {
             Ok(Some(Refusal::Integrates))
         } else {
-            let has_memory = |own: &&dyn ClosedLoops| own.loops().iter().any(is_hysteretic);
-            let is_weak = Some(own).filter(has_memory).is_some() && !took_most(state, entry);
+            let is_weak = own.loops().iter().any(is_hysteretic)
+                && state.cost > policy.left * state.best_without(place, progress)?.1;
             Ok(is_weak.then_some(Refusal::ResemblesMisfit))
         }
     } else if size(state, point, place)? > policy.large {
@@ -91,13 +92,6 @@ fn is_saturated(state: &SearchState, point: &Point) -> Result<bool, Error> {
 /// Whether the law of a loop is a hysteretic force.
 fn is_hysteretic(inner: &InnerLoop) -> bool {
     matches!(inner.law, Law::BoucWen { .. })
-}
-
-/// Whether an effect took most of the squares that the model without it had left, when it was added.
-fn took_most(state: &SearchState, entry: &Entry) -> bool {
-    let added = state.additions.iter().rfind(|own| own.trial.entry.name == entry.name);
-    let most = -state.setup.policy.examination.left.ln() * state.prepared.values();
-    added.is_some_and(|own| own.trial.deviance > most)
 }
 
 /// How many times the input is faster than an input stage passes unchanged, for one sample or several in a row; `None`

@@ -103,7 +103,7 @@ pub(super) fn doubt(
     if is_slow && gaps::are_missed(state, point, place)? {
         return Ok(Some(Refusal::Gaps));
     }
-    far_from_noise::doubt(state, point, place)
+    far_from_noise::doubt(state, point, place, progress)
 }
 
 /// Whether the model reaches the noise with the effect at a place, and a fit without it does not: parameters have bounds, so
