@@ -46,6 +46,9 @@ fn effects() -> Vec<Value> {
             {"sees": {"output": 0}, "law": {"power": {"exponent": 3, "scale": 1.0}}, "drives": [0.01]},
             {"sees": {"mixture": {"states": [0.2], "inputs": [0.1]}},
                 "law": {"stops": {"half_widths": [0.1], "weights": [0.2]}}, "drives": [0.01]}]}),
+        json!({"name": "hysteretic-stiffness", "loops": [
+            {"sees": {"output": 0}, "drives": [-0.01],
+                "law": {"bouc-wen": {"beta": 0.5, "gamma": -0.2, "exponent": 1.5}}}]}),
         json!({"name": "output-nonlinearity", "output": 0, "coefficients": [0.01, 0.02], "middle": 0.0, "scale": 5.0}),
         json!({"name": "gain-drift", "output": 0, "changes": [0.01, 0.02], "duration": 10.0}),
         json!({"name": "backlash", "output": 0, "half_width": 0.1}),
