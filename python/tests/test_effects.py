@@ -242,7 +242,7 @@ CASES = {
 
 
 def test_every_effect_has_a_case():
-    # other columns, and a force that is integrated: see test_covariate.py and test_hysteretic_stiffness.py
+    # other columns, and a force that is integrated (test_hysteretic_stiffness.py)
     assert set(CASES) | {"covariate", "hysteretic-stiffness"} == set(gpi.effect_names())
 
 

@@ -18,5 +18,5 @@ def _examples() -> None:
 
 reproduce.command("paper", cls=Command)(paper_command)
 reproduce.command("fsm", cls=Command)(steering_mirror_command)
-for name in BENCHMARKS:
-    reproduce.command(name, cls=Command)(command(name))
+for _name in BENCHMARKS:
+    reproduce.command(_name, cls=Command)(command(_name))
