@@ -98,6 +98,7 @@ def test_the_command_prints_and_writes(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 @needs_measured
+@pytest.mark.slow
 def test_the_hysteretic_force_of_the_benchmark_beats_what_is_published(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
