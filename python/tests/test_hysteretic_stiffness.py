@@ -167,6 +167,9 @@ def test_the_physics_of_the_public_benchmark_are_found() -> None:
     assert of["gamma[0]"] == pytest.approx(-1.1, rel=0.03)
     assert of["hysteretic_over_linear[0]"] == pytest.approx(1.0, rel=0.05)
     assert of["exponent[0]"] == pytest.approx(1.0, abs=0.05)
+    # the plays and deadzones that stood for the force are gone
+    (hysteresis,) = json.loads(found.model.to_json())["hysteresis"]
+    assert hysteresis["plays"]["half_widths"] == hysteresis["envelope"]["thresholds"] == [0.0]
 
 
 @pytest.mark.parametrize("stage", ["bouc-wen-spring", "dahl"])
@@ -175,3 +178,11 @@ def test_forces_of_other_textbooks_are_named(stage: str) -> None:
     found = gpi.explain(gpi.Record(record.u, record.y, rate=record.rate))
     assert found.effects == ["hysteretic-stiffness"]
     assert found.after["holdout"]["rms"] < 0.05 * found.before["holdout"]["rms"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("stage", "seed"), [("clipped", 1002), ("bouc-wen", 1004)])
+def test_no_force_stands_for_a_limit_or_for_hysteresis_before_the_dynamics(stage: str, seed: int) -> None:
+    record = textbook.draw(stage, seed)
+    found = gpi.explain(gpi.Record(record.u, record.y, rate=record.rate))
+    assert not {"stiffness", "hysteretic-stiffness"} & set(found.effects)

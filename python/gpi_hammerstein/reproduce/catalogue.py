@@ -1,7 +1,7 @@
 """The public benchmarks that can be reproduced: their files, splits, known physics and published errors.
 
 Each benchmark reads the public file if it is in the folder, else the parts of it under their own names
-(``train.csv.gz``), else it downloads the public file.
+(``train.csv.gz``), else it downloads the public file. The friction damper is read from the data folder only.
 """
 
 from collections.abc import Mapping

@@ -26,8 +26,7 @@
 //! z(t) = z_0 + s t + c t^2,     s = (3 z_0 - 4 z_1 + z_2) / 2,     c = (z_0 - 2 z_1 + z_2) / 2
 //! ```
 //!
-//! Where it turns at a t between -1 and 0, z goes from z_1 to `z(t)` and then to z_0. On the benchmark of a Bouc-Wen
-//! oscillator (20 samples a period), this makes the error of a fitted model four times smaller.
+//! Where it turns at a t between -1 and 0, z goes from z_1 to `z(t)` and then to z_0.
 //!
 //! Source: Y.-K. Wen, *Method for random vibration of hysteretic systems*, J. Eng. Mech. Div. ASCE 102, 1976.
 

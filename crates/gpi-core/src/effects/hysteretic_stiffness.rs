@@ -1,18 +1,15 @@
 //! A restoring force with hysteresis.
 //!
-//! Bouc and Wen's force acts inside the mechanics, (E7) in the documentation's theory: `x+ = A x + B v + E w`,
+//! Bouc and Wen's force acts inside the mechanics, (E16) in the documentation's theory: `x+ = A x + B v + E w`,
 //! `dw = dz - (beta |dz| w + gamma dz |w|) |w|^(n-1)`, z a displacement. As a force that opposes the displacement it makes the
 //! mechanics stiff for small motion and softer (or, for gamma < -beta, stiffer) for large motion, and it dissipates
 //! energy whatever the speed. With gamma = 0 and n = 1 it is Dahl's friction, which slides once the displacement has moved by several
 //! times 1 / beta.
 
-use super::loop_values;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
-use super::{
-    Block, ClosedLoops, InnerLoop, Law, Proposal, Quantity, Sees, Situation, Stage, Units,
-};
+use super::{ClosedLoops, InnerLoop, Law, Proposal, Sees, Situation, Stage};
 
-/// A loop around G through Bouc and Wen's force.
+/// A loop around G through Bouc and Wen's force: `x+ = A x + B v + E w`, w the force of [`Law::BoucWen`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HystereticStiffness {
     /// The loops, at least one.
@@ -56,35 +53,6 @@ impl HystereticStiffness {
     }
 }
 
-impl Block for HystereticStiffness {
-    fn values(&self) -> Vec<f64> {
-        loop_values::values(&self.loops)
-    }
-
-    fn set(&mut self, values: &[f64]) {
-        loop_values::set(&mut self.loops, values);
-    }
-
-    fn steps(&self) -> Vec<f64> {
-        vec![1e-6; self.values().len()]
-    }
-
-    fn bounds(&self) -> Vec<(f64, f64)> {
-        loop_values::bounds(&self.loops)
-    }
-
-    fn quantities(&self, units: Units) -> Vec<Quantity> {
-        loop_values::quantities(&self.loops, units)
-    }
-
-    /// Without beta, the force depends on the displacement alone.
-    fn is_possible(&self) -> bool {
-        self.loops
-            .iter()
-            .all(|inner| !matches!(inner.law, Law::BoucWen { beta, .. } if beta <= 0.0))
-    }
-}
-
 impl ClosedLoops for HystereticStiffness {
     fn loops(&self) -> &[InnerLoop] {
         &self.loops
@@ -92,13 +60,5 @@ impl ClosedLoops for HystereticStiffness {
 
     fn loops_mut(&mut self) -> &mut [InnerLoop] {
         &mut self.loops
-    }
-
-    fn in_steady_state(
-        &self,
-        units: Units,
-        relative_force: &dyn Fn(&InnerLoop) -> Option<f64>,
-    ) -> Vec<Quantity> {
-        loop_values::in_steady_state(&self.loops, units, relative_force)
     }
 }

@@ -73,7 +73,16 @@ impl Law {
 
     /// The number of values to which w does not respond linearly: the half-widths of stops; beta, gamma and the exponent.
     pub(crate) fn shapes(&self) -> usize {
-        self.memories()
+        match self {
+            Self::Power { .. } => 0,
+            Self::Stops { half_widths, .. } => half_widths.len(),
+            Self::BoucWen { .. } => 3,
+        }
+    }
+
+    /// Whether it dissipates energy by a force that must oppose the displacement.
+    pub(crate) fn is_dissipative(&self) -> bool {
+        matches!(self, Self::BoucWen { .. })
     }
 
     /// The number of weights of a sum.

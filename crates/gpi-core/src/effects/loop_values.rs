@@ -4,7 +4,35 @@
 //! of stops and their weights, or beta, gamma and the exponent. The product of E, the scale of the signal and the scale of w is what the
 //! output shows; therefore the largest element of S and T, or the widest half-width and the last weight of stops, are held.
 
-use super::{InnerLoop, Law, Quantity, Sees, Units};
+use super::{Block, ClosedLoops, InnerLoop, Law, Quantity, Sees, Units};
+
+impl<T: ClosedLoops> Block for T {
+    fn values(&self) -> Vec<f64> {
+        values(self.loops())
+    }
+
+    fn set(&mut self, values: &[f64]) {
+        set(self.loops_mut(), values);
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        vec![1e-6; self.values().len()]
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        bounds(self.loops())
+    }
+
+    fn quantities(&self, units: Units) -> Vec<Quantity> {
+        quantities(self.loops(), units)
+    }
+
+    /// Without beta, Bouc and Wen's force depends on the displacement alone.
+    fn is_possible(&self) -> bool {
+        let mut laws = self.loops().iter().map(|inner| &inner.law);
+        laws.all(|law| !matches!(law, Law::BoucWen { beta, .. } if *beta <= 0.0))
+    }
+}
 
 /// Values of a loop that have the same form.
 enum Group<'a> {
@@ -34,7 +62,7 @@ fn groups(inner: &mut InnerLoop) -> Vec<Group<'_>> {
 }
 
 /// The values of all loops, in order.
-pub(super) fn values(loops: &[InnerLoop]) -> Vec<f64> {
+fn values(loops: &[InnerLoop]) -> Vec<f64> {
     let mut values = Vec::new();
     for inner in &mut loops.to_vec() {
         for group in groups(inner) {
@@ -48,7 +76,7 @@ pub(super) fn values(loops: &[InnerLoop]) -> Vec<f64> {
 }
 
 /// Takes other values, as many as [`values`] returns.
-pub(super) fn set(loops: &mut [InnerLoop], values: &[f64]) {
+fn set(loops: &mut [InnerLoop], values: &[f64]) {
     let mut rest = values.iter().copied();
     for group in loops.iter_mut().flat_map(groups) {
         match group {
@@ -63,7 +91,7 @@ pub(super) fn set(loops: &mut [InnerLoop], values: &[f64]) {
 }
 
 /// Smallest and largest sensible value of each.
-pub(super) fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
+fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
     let free = |count: usize| vec![(f64::NEG_INFINITY, f64::INFINITY); count];
     let mut bounds = Vec::new();
     for inner in loops {
@@ -111,7 +139,7 @@ pub(super) fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
 }
 
 /// The numbers that describe the loops.
-pub(super) fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
+fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
     let mut found = Vec::new();
     for (q, inner) in loops.iter().enumerate() {
         let mut list = |what: &str, values: &[f64], zero_is_absence: bool| {

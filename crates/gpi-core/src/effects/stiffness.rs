@@ -12,11 +12,8 @@
 //! drives them (see `loop_signals`).
 
 use super::loop_signals::{LoopSignal, Shape, families};
-use super::loop_values;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
-use super::{
-    Block, ClosedLoops, InnerLoop, Law, Proposal, Quantity, Sees, Situation, Stage, Units,
-};
+use super::{Block, ClosedLoops, InnerLoop, Law, Proposal, Sees, Situation, Stage};
 
 /// Nonlinear loops around G: `x+ = A x + B v + E w`, `w = law(S x + T v)`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -109,28 +106,6 @@ fn values_of(inner: &InnerLoop) -> usize {
     Stiffness { loops: vec![inner.clone()] }.values().len()
 }
 
-impl Block for Stiffness {
-    fn values(&self) -> Vec<f64> {
-        loop_values::values(&self.loops)
-    }
-
-    fn set(&mut self, values: &[f64]) {
-        loop_values::set(&mut self.loops, values);
-    }
-
-    fn steps(&self) -> Vec<f64> {
-        vec![1e-6; self.values().len()]
-    }
-
-    fn bounds(&self) -> Vec<(f64, f64)> {
-        loop_values::bounds(&self.loops)
-    }
-
-    fn quantities(&self, units: Units) -> Vec<Quantity> {
-        loop_values::quantities(&self.loops, units)
-    }
-}
-
 impl ClosedLoops for Stiffness {
     fn loops(&self) -> &[InnerLoop] {
         &self.loops
@@ -138,13 +113,5 @@ impl ClosedLoops for Stiffness {
 
     fn loops_mut(&mut self) -> &mut [InnerLoop] {
         &mut self.loops
-    }
-
-    fn in_steady_state(
-        &self,
-        units: Units,
-        relative_force: &dyn Fn(&InnerLoop) -> Option<f64>,
-    ) -> Vec<Quantity> {
-        loop_values::in_steady_state(&self.loops, units, relative_force)
     }
 }

@@ -213,7 +213,8 @@ settings! {
         /// many as an experiment has held-out blocks, because with fewer some blocks cannot test the limit.
         exceedances: usize = 10, FROM_ONE;
         /// Part of the squares of the best model without it that a hysteretic force in the mechanics may leave, where the model is far
-        /// from the noise. On records of known truth false ones left 0.10 to 0.6, true ones at most 0.042.
+        /// from the noise. On records of known truth false ones left 0.10 to 0.6, true forces of one element at most 0.042; sums
+        /// of elements left up to 0.4 and are then not named.
         left: f64 = 0.05, PART;
         /// Part by which the squares must fall for the model without a refused effect to be taken instead of the present one:
         /// that of a finer grid that goes on.

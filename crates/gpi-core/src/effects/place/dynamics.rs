@@ -2,6 +2,7 @@
 
 use crate::effects::block::Block;
 use crate::effects::inner_loop::InnerLoop;
+use crate::effects::loop_values;
 use crate::effects::quantity::{Quantity, Units};
 
 /// The coefficients `a1, ..` and `b1, ..` of `(b1 q^-1 + ..) / (1 + a1 q^-1 + ..)`.
@@ -44,5 +45,7 @@ pub trait ClosedLoops: Block {
         &self,
         units: Units,
         relative_force: &dyn Fn(&InnerLoop) -> Option<f64>,
-    ) -> Vec<Quantity>;
+    ) -> Vec<Quantity> {
+        loop_values::in_steady_state(self.loops(), units, relative_force)
+    }
 }

@@ -18,17 +18,14 @@
 //! - a hysteretic force in such a loop that leaves more than a part of the squares of the best model without it, because it
 //!   resembles a hysteresis before the dynamics.
 //!
-//! A loop is not named, near the noise or not, where the output saturates and the model errs more there than elsewhere: it makes
-//! up for the limit.
-//!
 //! Lines and measured columns are not asked, because no misfit resembles them, nor are modes, other loops and shapes of
 //! hysteresis loops, which may well be a large part.
 
 use super::contribution::contribution;
 use crate::chain::point::Point;
-use crate::effects::{FreeOrder, InnerLoop, Law, Place, Signature};
+use crate::effects::{FreeOrder, Place, Signature};
 use crate::explain::judgement::Refusal;
-use crate::explain::outside::{integrates, saturates};
+use crate::explain::outside::integrates;
 use crate::explain::state::SearchState;
 use crate::{Error, Experiment, Progress, Record};
 
@@ -53,9 +50,6 @@ pub(super) fn doubt(
     if !is_asked || entry.signature == Signature::Unique || entry.free_order == FreeOrder::JoinsG {
         return Ok(None);
     }
-    if matches!(of, Place::Loops(_)) && is_saturated(state, point)? {
-        return Ok(Some(Refusal::Saturates));
-    }
     let policy = &state.setup.policy.examination;
     let test = state.setup.test.scored().max(1) as f64;
     let trained = state.prepared.record.scored().max(1) as f64;
@@ -72,7 +66,7 @@ pub(super) fn doubt(
         if integrates(record, outside)? {
             Ok(Some(Refusal::Integrates))
         } else {
-            let is_weak = own.loops().iter().any(is_hysteretic)
+            let is_weak = own.loops().iter().any(|inner| inner.law.is_dissipative())
                 && state.cost > policy.left * state.best_without(place, progress)?.1;
             Ok(is_weak.then_some(Refusal::ResemblesMisfit))
         }
@@ -81,17 +75,6 @@ pub(super) fn doubt(
     } else {
         Ok(None)
     }
-}
-
-/// Whether the output saturates where the model errs most.
-fn is_saturated(state: &SearchState, point: &Point) -> Result<bool, Error> {
-    let record = &state.prepared.record;
-    saturates(record, &point.residuals(record)?, &state.setup.policy.outside)
-}
-
-/// Whether the law of a loop is a hysteretic force.
-fn is_hysteretic(inner: &InnerLoop) -> bool {
-    matches!(inner.law, Law::BoucWen { .. })
 }
 
 /// How many times the input is faster than an input stage passes unchanged, for one sample or several in a row; `None`

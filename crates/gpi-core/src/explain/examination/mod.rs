@@ -27,10 +27,11 @@ mod gaps;
 mod own_part;
 
 use super::judgement::{Evidence, Refusal, judge};
+use super::outside::saturates;
 use super::state::{SearchState, Trial};
 use super::trial::{fitted, join_modes};
 use crate::chain::point::Point;
-use crate::effects::{Block, Effect, FreeOrder, InnerLoop, Law, Place, Signature};
+use crate::effects::{Block, Effect, FreeOrder, InnerLoop, Place, Signature};
 use crate::fit::line_modes::line_modes;
 use crate::fit::memory::Memory;
 use crate::fit::minimize::Fitted;
@@ -91,6 +92,9 @@ pub(super) fn doubt(
     if let Some(refusal) = impossible(point, place) {
         return Ok(Some(refusal));
     }
+    if matches!(point.effects[place].place(), Place::Loops(_)) && is_saturated(state)? {
+        return Ok(Some(Refusal::Saturates));
+    }
     if !own_part::is_beyond_chance(state, point, place, state.cost)?
         && !is_needed(state, place, progress)?
     {
@@ -104,6 +108,12 @@ pub(super) fn doubt(
         return Ok(Some(Refusal::Gaps));
     }
     far_from_noise::doubt(state, point, place, progress)
+}
+
+/// Whether the output stands at a limit while the input moves, and the model errs most there. A loop makes up for the limit.
+fn is_saturated(state: &SearchState) -> Result<bool, Error> {
+    let record = &state.prepared.record;
+    saturates(record, &state.point.residuals(record)?, &state.setup.policy.outside)
 }
 
 /// Whether the model reaches the noise with the effect at a place, and a fit without it does not: parameters have bounds, so
@@ -149,8 +159,7 @@ fn impossible(point: &Point, place: usize) -> Option<Refusal> {
 /// Whether a loop is a force with beta > 0 that follows the displacement instead of opposing it: each cycle would add energy.
 fn adds_energy(point: &Point, inner: &InnerLoop) -> bool {
     let gains = |drives: &[f64]| Some(point.dynamics.gains_from_states(drives));
-    let is_dissipative = matches!(inner.law, Law::BoucWen { .. });
-    is_dissipative && inner.relative_force(gains).is_some_and(|force| force <= 0.0)
+    inner.law.is_dissipative() && inner.relative_force(gains).is_some_and(|force| force <= 0.0)
 }
 
 /// Where the newest effect of a name stands.
