@@ -55,9 +55,31 @@ LOOP = closed(
                         )
                     }
                 ),
+                closed(
+                    {
+                        "dahl": closed(
+                            {
+                                "distance": size("break-away distance in the unit of z"),
+                                "averaged": flag("whether w is exact in the mean"),
+                            }
+                        )
+                    }
+                ),
+                {"const": "speed"},
             ]
         },
-        "drives": numbers("what the force adds to each state"),
+        "drives": {
+            "oneOf": [
+                numbers("what the force adds to each state"),
+                closed(
+                    {
+                        "input": INPUT,
+                        "force": number("how much of v of that input it takes away"),
+                        "states": count("states behind the dead time"),
+                    }
+                ),
+            ]
+        },
     }
 )
 LAW = closed({"exponent": number(), "knee": size(), "lag": size("time constant in s")})
@@ -104,6 +126,7 @@ EFFECTS: dict[str, Schema] = {
     ),
     "stiffness": closed({"loops": listed(LOOP)}),
     "hysteretic-stiffness": closed({"loops": listed(LOOP)}),
+    "friction": closed({"loops": listed(LOOP)}),
     "output-nonlinearity": closed(
         {"output": OUTPUT, "coefficients": numbers(), "middle": number(), "scale": size()}
     ),

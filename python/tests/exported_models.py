@@ -74,6 +74,21 @@ EFFECTS: dict[str, dict[str, Any]] = {
             }
         ]
     },
+    "friction": {
+        "loops": [
+            {
+                "sees": {"output": 0},
+                "law": {"dahl": {"distance": 0.6, "averaged": True}},
+                "drives": {"input": 0, "force": 0.15, "states": 3},
+            },
+            {
+                "sees": {"output": 0},
+                "law": {"dahl": {"distance": 0.2, "averaged": False}},
+                "drives": [-0.04, 0.01, 0.0],
+            },
+            {"sees": {"output": 0}, "law": "speed", "drives": {"input": 0, "force": -0.1, "states": 3}},
+        ]
+    },
     "output-nonlinearity": {"output": 0, "coefficients": [0.02, 0.01], "middle": 0.3, "scale": 5.0},
     "gain-drift": {"output": 0, "changes": [0.02, 0.01, -0.03], "duration": 2.0},
     "backlash": {"output": 0, "half_width": 0.05},

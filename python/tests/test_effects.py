@@ -243,7 +243,7 @@ CASES = {
 
 def test_every_effect_has_a_case():
     # other columns, and a force that is integrated (test_hysteretic_stiffness.py)
-    assert set(CASES) | {"covariate", "hysteretic-stiffness"} == set(gpi.effect_names())
+    assert set(CASES) | {"covariate", "hysteretic-stiffness", "friction"} == set(gpi.effect_names())
 
 
 @pytest.mark.parametrize("name", sorted(CASES))

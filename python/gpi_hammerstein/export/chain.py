@@ -87,7 +87,7 @@ def chain_of(model: Model) -> Chain:
         for values, rows, columns in (saved["linear"][name] for name in "abcd")
     )
     banks = [_hysteresis(own) for own in saved["hysteresis"]]
-    around = Around(saved["rate"], len(a), b.shape[1], [bank.half_widths for bank in banks])
+    around = Around(saved["rate"], len(a), b.shape[1], [bank.half_widths for bank in banks], a, b)
     operations = [own for effect in saved.get("effects", []) for own in _operations(effect, around)]
     placed, lines, size = _placed(operations)
     labels = {own.column: own.label for own in placed if own.column is not None}

@@ -25,6 +25,9 @@ class Around:
     inputs: int
     #: The half-widths of the plays of each input.
     half_widths: list[Array]
+    #: A and B of the dynamics.
+    a: Array
+    b: Array
 
 
 def share(time_constant: float, rate: float) -> float:
@@ -109,15 +112,26 @@ def creep(own: Parameters, around: Around) -> list[Operation]:
 
 
 def stiffness(own: Parameters, around: Around) -> list[Operation]:
-    """(E7), (E16): forces that depend on the displacement or on the states, and drive the states."""
+    """(E7), (E16), (E17): forces that depend on the displacement or on the states, and drive the states."""
     loops = (_loop(inner, around) for inner in own["loops"])
     # stops of which there are none have no force
     return [own for own in loops if own.kind == "power" or own.memory > 0]
 
 
+def _driven(drives: Any, around: Around) -> Array:
+    """Return a column of E. A force enters where an input does, behind the dead time."""
+    column = np.zeros(around.states)
+    if isinstance(drives, list):
+        column[around.states - len(drives) :] = drives
+        return column
+    first = around.states - drives["states"]
+    entered = around.b if first == 0 else around.a[:, first - around.inputs : first]
+    column[first:] = -drives["force"] * entered[first:, drives["input"]]
+    return column
+
+
 def _loop(inner: Parameters, around: Around) -> Operation:
-    drives = np.zeros(around.states)
-    drives[around.states - len(inner["drives"]) :] = inner["drives"]
+    drives = _driven(inner["drives"], around)
     seen, output = None, 0
     if "output" in inner["sees"]:
         output = inner["sees"]["output"]
@@ -136,6 +150,12 @@ def _loop(inner: Parameters, around: Around) -> Operation:
     if "bouc-wen" in inner["law"]:
         law = inner["law"]["bouc-wen"]
         return Operation("bouc_wen", "loops", output, dict(law), memory=3, seen=seen, drives=drives)
+    if "dahl" in inner["law"]:
+        law = inner["law"]["dahl"]
+        numbers = {"distance": law["distance"], "averaged": int(law["averaged"])}
+        return Operation("dahl", "loops", output, numbers, memory=3, seen=seen, drives=drives)
+    if inner["law"] == "speed":
+        return Operation("speed", "loops", output, memory=1, seen=seen, drives=drives)
     law = inner["law"]["stops"]
     arrays = {key: np.array(law[key]) for key in ("half_widths", "weights")}
     count = len(law["weights"])
@@ -214,6 +234,7 @@ EXPORTED: dict[str, Callable[[Parameters, Around], list[Operation]]] = {
     "creep": creep,
     "stiffness": stiffness,
     "hysteretic-stiffness": stiffness,
+    "friction": stiffness,
     "output-nonlinearity": output_nonlinearity,
     "gain-drift": gain_drift,
     "backlash": backlash,

@@ -214,7 +214,8 @@ def parameters(model: Model) -> int:
     count: int = model.linear.order * (inputs + outputs) + inputs * outputs
     for effect in json.loads(model.to_json()).get("effects", []):
         for around in effect.get("loops", []):
-            count += len(around["drives"])
+            drives = around["drives"]
+            count += len(drives) if isinstance(drives, list) else 1
             mixture = around["sees"].get("mixture", {})
             count += len(mixture.get("states", [])) + len(mixture.get("inputs", []))
             stops = around["law"].get("stops")

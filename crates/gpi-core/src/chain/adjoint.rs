@@ -133,6 +133,8 @@ struct Back<'a> {
     b: Vec<Vec<f64>>,
     d: &'a Matrix,
     loops: Vec<&'a InnerLoop>,
+    /// The column of E of each.
+    drives: Vec<Vec<f64>>,
     /// The output that each effect of the output stage acts on.
     sensed: Vec<usize>,
     places: &'a Places,
@@ -156,9 +158,11 @@ impl<'a> Back<'a> {
         let sections = point.sections();
         let (outputs, inputs) = dynamics.d.shape();
         let sensed = sensed(point);
+        let b = columns(&sections, inputs);
         Self {
+            drives: loops.iter().map(|inner| inner.drives.column(&b)).collect(),
             c: rows(&sections, outputs),
-            b: columns(&sections, inputs),
+            b,
             sections,
             d: &dynamics.d,
             plays: vec![0.0; loops.iter().map(|inner| inner.law.memories()).sum()],
@@ -218,8 +222,8 @@ impl<'a> Back<'a> {
         for (place, b) in v.clone().zip(&self.b) {
             work[place] += dot(b, &self.x);
         }
-        for (place, inner) in w.clone().zip(&self.loops) {
-            work[place] += dot(&inner.drives, &self.x);
+        for (place, drives) in w.clone().zip(&self.drives) {
+            work[place] += dot(drives, &self.x);
         }
         let mut first = 0;
         for section in &self.sections {

@@ -19,18 +19,12 @@
 //! make `n k g^(n-1) l` small, the shortest near zero. All numbers carry their derivatives ([`Jet`]), which are therefore those of the numerical
 //! solution.
 //!
-//! A z that turns back between two samples has moved farther than either of them shows. Its path over the last sample is the
-//! parabola through the last three samples, with t from -1 to 0:
-//!
-//! ```text
-//! z(t) = z_0 + s t + c t^2,     s = (3 z_0 - 4 z_1 + z_2) / 2,     c = (z_0 - 2 z_1 + z_2) / 2
-//! ```
-//!
-//! Where it turns at a t between -1 and 0, z goes from z_1 to `z(t)` and then to z_0.
+//! A z that turns back between two samples goes by way of its [turning point](turning_point).
 //!
 //! Source: Y.-K. Wen, *Method for random vibration of hysteretic systems*, J. Eng. Mech. Div. ASCE 102, 1976.
 
 use super::jet::Jet;
+use super::turning_point::turning_point;
 
 /// A number with its derivatives by the force at the sample before, z, z one and two samples before, beta, gamma and n.
 type Number = Jet<7>;
@@ -80,28 +74,13 @@ impl Step {
         };
         let mut w = Number::variable(force, 0);
         let mut from = before;
-        if let Some(turn) = turn(z) {
-            w = law.changed(w, turn - from);
-            from = turn;
+        if let Some(turn) = turning_point(z) {
+            w = law.changed(w, turn.z - from);
+            from = turn.z;
         }
         w = law.changed(w, now - from);
         Self { force: w.value, slopes: w.slopes }
     }
-}
-
-/// Where z turns back between the last two samples; `None` where it does not.
-fn turn([now, before, older]: [f64; 3]) -> Option<Number> {
-    let slope = 0.5 * (3.0 * now - 4.0 * before + older);
-    let curvature = now - 2.0 * before + older;
-    let t = -slope / curvature;
-    let mut turn = Number::constant(now + 0.5 * slope * t);
-    // the parabola is flat there, so that a change of t does not move it
-    turn.slopes[1..4].copy_from_slice(&[
-        1.0 + 1.5 * t + 0.5 * t * t,
-        -2.0 * t - t * t,
-        0.5 * t + 0.5 * t * t,
-    ]);
-    (-1.0 < t && t < 0.0).then_some(turn)
 }
 
 struct Law {
@@ -216,16 +195,12 @@ mod tests {
     }
 
     #[test]
-    fn z_turns_at_the_top_of_the_parabola() {
-        // 4 - (t + 1/2)^2 at t = 0, -1, -2
-        let samples = [3.75, 3.75, 1.75];
-        assert_eq!(turn(samples).map(|turn| turn.value), Some(4.0));
-        // the motion turned before, or goes on
-        assert!(turn([1.75, 3.75, 3.75]).is_none());
-        assert!(turn([3.0, 2.0, 1.0]).is_none() && turn([1.0; 3]).is_none());
+    fn a_motion_that_turns_goes_by_way_of_the_turning_point() {
+        // the parabola 4 - (t + 1/2)^2 at t = 0, -1, -2
         let shape = Shape { beta: 0.8, gamma: 0.3, exponent: 1.3 };
         let there = changed(0.1, 0.25, shape);
-        assert_eq!(Step::new(0.1, samples, shape).force, changed(there, -0.25, shape));
+        let found = Step::new(0.1, [3.75, 3.75, 1.75], shape).force;
+        assert_eq!(found, changed(there, -0.25, shape));
     }
 
     proptest! {
@@ -248,7 +223,7 @@ mod tests {
                 Step::new(force + f, z, shape)
             };
             // no derivative where loading turns into unloading
-            let turn = turn([now, before, older]).map_or(now, |turn| turn.value);
+            let turn = turning_point::<7>([now, before, older]).map_or(now, |turn| turn.z.value);
             prop_assume!(force.abs() > 1e-3 && (now - before).abs() > 1e-4);
             prop_assume!((turn - before).abs() > 1e-4);
             prop_assume!(turn == now || (now - turn).abs() > 1e-4);

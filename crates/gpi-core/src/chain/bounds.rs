@@ -28,6 +28,7 @@ use super::point::{Freedom, Point};
 use super::table::{Group, Table};
 use crate::Record;
 use crate::effects::Block;
+use crate::linear::LARGEST_POLE;
 use crate::optimize::Bounds;
 
 /// What a value may change by.
@@ -75,11 +76,10 @@ impl Point {
         let values = group.read(self);
         let held = |condition: bool| if condition { HELD } else { FREE };
         match group {
-            Group::Weights { .. } | Group::Slopes { .. } | Group::Offsets { .. }
-                if !freedom.weights =>
-            {
+            Group::Weights { .. } | Group::Slopes { .. } if !freedom.weights => {
                 vec![HELD; values.len()]
             }
+            Group::Offsets { .. } => vec![held(!freedom.offsets); values.len()],
             Group::Weights { input } => {
                 let moved = self.envelope_span(record, input);
                 let widths = &self.channels[input].half_widths;
@@ -99,7 +99,13 @@ impl Point {
                     let ends = [-1.0, 1.0].map(|end| elements.nearest(place, end * most(r)));
                     (ends[0] - weight, ends[1] - weight)
                 };
-                values.iter().zip(widths).enumerate().map(limits).collect()
+                let mut limits: Vec<Limits> =
+                    values.iter().zip(widths).enumerate().map(limits).collect();
+                if self.dynamics.held[input].is_none() {
+                    // it sets the scale of v
+                    limits[0] = HELD;
+                }
+                limits
             }
             Group::Slopes { input } => {
                 let is_held = !freedom.identity || self.widest_used(input) == 0;
@@ -151,11 +157,16 @@ impl Point {
                 };
                 values.iter().enumerate().map(side).collect()
             }
+            // a pole that integrates stands at the unit circle; others are kept inside by their step
+            Group::Denominator { section }
+                if values.len() == 1 && self.dynamics.sections[section].at > 1.0 =>
+            {
+                vec![(-LARGEST_POLE - values[0], LARGEST_POLE - values[0])]
+            }
             Group::Denominator { .. }
             | Group::Numerator { .. }
             | Group::ParallelNumerator { .. }
             | Group::Feedthrough { .. }
-            | Group::Offsets { .. }
             | Group::State { .. } => vec![FREE; values.len()],
         }
     }
@@ -258,6 +269,7 @@ mod tests {
     fn limits(point: &Point, group: Group) -> Vec<Limits> {
         let freedom = Freedom {
             weights: true,
+            offsets: true,
             derivatives: Derivatives::default(),
             states: false,
             identity: false,

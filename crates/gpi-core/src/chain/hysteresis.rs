@@ -70,6 +70,11 @@ pub(crate) struct Parameters {
 }
 
 impl Parameters {
+    /// The slope of v over u where all plays slide, and no deadzone but that of threshold 0 is passed.
+    pub(crate) fn slope(&self) -> f64 {
+        self.slopes[0] * self.weights.iter().sum::<f64>()
+    }
+
     /// v = Z_0(u) on the given grid: the identity for one-sided deadzones.
     pub(crate) fn identity(
         reading: Reading,

@@ -9,19 +9,22 @@
 //! | values of a curve through which plays are read | v of its input | dv/dtheta | 1 |
 //! | a_j of a section | x_j | x_1 of the section | -1 |
 //! | b_ji | x_j | v_i | 1 |
+//! | b_ji, for each force F that enters where input i does | x_j | w | -F |
 //! | c_oj | y_o | x_j | 1 |
 //! | d_oi | y_o | v_i | 1 |
 //! | E_j of a loop | x_j | w | 1 |
+//! | a force F that enters where input i does | every x_j | w | -b_ji |
 //! | S_j, T_i of a loop | z | x_j, v_i | 1 |
 //! | ln r of a stop | half-width | 1 | r |
 //! | beta, gamma, n of Bouc and Wen's force | itself | 1 | 1 |
+//! | ln d of Dahl's friction | d | 1 | d |
 //! | weight of a stop | w | z - F, the stop | 1 |
 //!
 //! A is in observer form, so that a_j multiplies the first state only: `dA/da_j = -e_j e_1'`.
 //!
 //! # The held DC gain
 //!
-//! One element of each column of D is no unknown: `d_oi = g_i - sum_s c_o (I - A_s)^-1 b_i` keeps the DC gain g_i from
+//! Where the DC gain of a column is held, one element of that column of D is no unknown: `d_oi = g_i - sum_s c_o (I - A_s)^-1 b_i` keeps the DC gain g_i from
 //! input i to the output o at which it is held. A change of a section therefore changes D as well, which is an
 //! injection of v_i at y_o. With the steady state `q = (I - A)^-1 b_i` (order) and `h = c_o (I - A)^-1` (order) of the
 //! section,
@@ -39,7 +42,7 @@ use super::point::Point;
 use super::sensitivity::{Columns, Derivatives};
 use super::table::{Group, Table};
 use crate::Matrix;
-use crate::effects::{InnerLoop, Law, Place, Sees};
+use crate::effects::{Drives, InnerLoop, Law, Place, Sees};
 use crate::linear::Section;
 use std::ops::Range;
 
@@ -210,9 +213,10 @@ impl Entries<'_> {
         let dynamics = &self.point.dynamics;
         let own = &dynamics.sections[section];
         let first = dynamics.sections[..section].iter().map(Section::order).sum();
-        let held = dynamics.held.iter().map(|held| held.0).enumerate().collect();
-        let gain = &own.c * own.standing(&Matrix::identity(own.order(), own.order()));
-        (first, held, own.standing(&own.b), gain)
+        let held = dynamics.held.iter().enumerate();
+        let held = held.filter_map(|(input, held)| Some((input, (*held)?.0))).collect();
+        let gain = &own.c * own.steady(&Matrix::identity(own.order(), own.order()));
+        (first, held, own.steady(&own.b), gain)
     }
 
     fn denominator(&mut self, section: usize, unknowns: Range<usize>) {
@@ -233,6 +237,13 @@ impl Entries<'_> {
         for (place, unknown) in unknowns.enumerate() {
             let (input, j) = (place / standing.nrows(), place % standing.nrows());
             self.add(unknown, states + j, self.v(input), 1.0);
+            for (number, inner) in self.point.loops().enumerate() {
+                if let Drives::Input { input: own, force, .. } = inner.drives
+                    && own == input
+                {
+                    self.add(unknown, states + j, self.signals.loops[number].start, -force);
+                }
+            }
             for &(input, output) in held.iter().filter(|held| held.0 == input) {
                 self.add(unknown, y + output, self.v(input), -gain[(output, j)]);
             }
@@ -278,12 +289,26 @@ impl Entries<'_> {
         let (places, signals) = (self.places, self.signals);
         let own = signals.loops[number].clone();
         let mut unknown = first;
+        if let Drives::Input { input, .. } = inner.drives {
+            // one unknown moves all states
+            for (j, b) in self.point.dynamics.driven_by(input).enumerate() {
+                self.found.push(Injection {
+                    unknown,
+                    place: places.states.start + j,
+                    signal: own.start,
+                    factor: -b,
+                });
+            }
+            unknown += 1;
+        }
         let mut add = |place: usize, signal: usize, factor: f64| {
             self.found.push(Injection { unknown, place, signal, factor });
             unknown += 1;
         };
-        for j in 0..inner.drives.len() {
-            add(places.states.start + j, own.start, 1.0);
+        if let Drives::States(column) = &inner.drives {
+            for j in 0..column.len() {
+                add(places.states.start + j, own.start, 1.0);
+            }
         }
         if let Sees::Mixture { states, inputs } = &inner.sees {
             for j in 0..states.len() {
@@ -295,7 +320,9 @@ impl Entries<'_> {
         }
         let shapes = places.shapes[number].clone();
         match &inner.law {
-            Law::Power { .. } => {}
+            Law::Power { .. } | Law::Speed => {}
+            // by its logarithm
+            Law::Dahl { distance, .. } => shapes.for_each(|place| add(place, ONE, *distance)),
             Law::Stops { half_widths, weights } => {
                 for (place, r) in shapes.zip(half_widths) {
                     // by its logarithm

@@ -32,6 +32,24 @@ impl<const N: usize> Jet<N> {
         self.through(value, -value * value)
     }
 
+    pub(super) fn exp(self) -> Self {
+        let value = self.value.exp();
+        self.through(value, value)
+    }
+
+    /// `(1 - exp(-x)) / x` for x >= 0, the mean of a decay.
+    pub(super) fn mean_of_decay(self) -> Self {
+        /// Where the series to the third power is exact to rounding.
+        const SMALL: f64 = 1e-4;
+        let x = self.value;
+        if x < SMALL {
+            let value = 1.0 - x * (1.0 / 2.0 - x * (1.0 / 6.0 - x / 24.0));
+            return self.through(value, -1.0 / 2.0 + x * (1.0 / 3.0 - x / 8.0));
+        }
+        let value = -(-x).exp_m1() / x;
+        self.through(value, ((-x).exp() - value) / x)
+    }
+
     /// `x^p` for x >= 0 and p >= 1. At x = 0 all derivatives are those from the right; `x^p ln x` is 0 there.
     pub(super) fn power(self, exponent: Self) -> Self {
         let (x, p) = (self.value, exponent.value);
@@ -99,6 +117,15 @@ mod tests {
         let by_x = 3.0 * 1.8 * 0.7_f64.powf(0.8) + inverse * inverse * 1.8;
         let by_p = 3.0 * power * 0.7_f64.ln() + inverse * inverse * 0.7;
         assert!((found.slopes[0] - by_x).abs() < 1e-14 && (found.slopes[1] - by_p).abs() < 1e-14);
+        let found = (x * 2.0).exp();
+        assert_eq!((found.value, found.slopes), (1.4_f64.exp(), [2.0 * 1.4_f64.exp(), 0.0]));
+        for x in [0.0, 5e-5, 0.3, 40.0] {
+            let of = |x: f64| Jet::<1>::variable(x, 0).mean_of_decay();
+            let exact = if x > 0.0 { -f64::exp_m1(-x) / x } else { 1.0 };
+            assert!((of(x).value - exact).abs() < 1e-14);
+            let difference = (of(x + 1e-5).value - of(x).value) / 1e-5;
+            assert!((of(x + 5e-6).slopes[0] - difference).abs() < 1e-9, "{x}");
+        }
         let zero = Jet::<2>::variable(0.0, 0).power(Jet::variable(1.0, 1));
         assert_eq!(zero, Jet { value: 0.0, slopes: [1.0, 0.0] });
     }

@@ -1,11 +1,13 @@
 //! A plant with every kind of thing in the loops around G and behind them, for tests.
 //!
-//! Two inputs and two outputs, three states, three loops: one sum of stops that sees a mixture of states and inputs, a
-//! cubic power and a force of Bouc and Wen that see an output each, a backlash and a polynomial behind one output. The gains of
+//! Two inputs and two outputs, three states, five loops: one sum of stops that sees a mixture of states and inputs, a
+//! cubic power, a force of Bouc and Wen, Dahl's friction and a speed that see an output each, a backlash and a polynomial behind one output. The gains of
 //! the loops are small enough that the plant stays in motion and that plays and stops both stick and slide within a
 //! run.
 
-use crate::effects::{Backlash, Effect, InnerLoop, Law, OutputNonlinearity, Sees, Stiffness};
+use crate::effects::{
+    Backlash, Drives, Effect, InnerLoop, Law, OutputNonlinearity, Sees, Stiffness,
+};
 use crate::linear::StateSpace;
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
 use crate::{Channel, Experiment, Matrix, Model, Record};
@@ -19,7 +21,8 @@ fn stiffness() -> Stiffness {
         weights: vec![0.6, 1.0],
     };
     let mixture = Sees::Mixture { states: vec![0.8, -0.3, 0.4], inputs: vec![0.2, 0.1] };
-    let drives = |scale: f64| (1..=STATES).map(|j| scale / j as f64).collect();
+    let drives = |scale: f64| Drives::States((1..=STATES).map(|j| scale / j as f64).collect());
+    let force = Drives::Input { input: 1, force: 0.2, states: STATES };
     Stiffness {
         loops: vec![
             InnerLoop { sees: mixture, law: stops([0.2, 0.7]), drives: drives(0.05) },
@@ -33,6 +36,12 @@ fn stiffness() -> Stiffness {
                 law: Law::BoucWen { beta: 0.6, gamma: -0.2, exponent: 1.5 },
                 drives: drives(0.03),
             },
+            InnerLoop {
+                sees: Sees::Output(0),
+                law: Law::Dahl { distance: 0.4, averaged: true },
+                drives: force,
+            },
+            InnerLoop { sees: Sees::Output(1), law: Law::Speed, drives: drives(0.05) },
         ],
     }
 }

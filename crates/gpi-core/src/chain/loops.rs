@@ -23,11 +23,13 @@
 //! sample thus passes nothing of z: `dw = g_i m_i dr_i`, the saturated stop. The derivative by a weight is the stop
 //! `z - F_i` itself, and is injected at w (see `injections`).
 //!
-//! Bouc and Wen's force remembers w and the last two z, and depends on the path of z alone; its step and the derivatives of it,
-//! which are the marks, are in [`super::bouc_wen`]. w(k) drives the states for sample k + 1 only, so that no
+//! The forces of Bouc and Wen and of Dahl remember the force and the last two z, and depend on the path of z alone; their steps and the
+//! derivatives of them, which are the marks, are in [`super::bouc_wen`] and [`super::dahl`]. The speed `|z - z_1|` has the sign of
+//! `z - z_1` as its mark. w(k) drives the states for sample k + 1 only, so that no
 //! loop is algebraic and all loops of a sample are evaluated independently of each other.
 
 use super::bouc_wen::{Shape, Step};
+use super::dahl::friction;
 use super::lanes::{Lanes, NONE, add};
 use crate::effects::{InnerLoop, Law, Sees};
 use crate::linear::dot;
@@ -37,6 +39,8 @@ use pulp::Simd;
 /// Loops in motion.
 pub(crate) struct Loops<'a> {
     pub loops: Vec<&'a InnerLoop>,
+    /// The column of E of each.
+    drives: Vec<Vec<f64>>,
     /// The signals of each.
     pub signals: Vec<LoopSignals>,
 }
@@ -50,8 +54,8 @@ pub(crate) struct LoopSignals {
 }
 
 impl<'a> Loops<'a> {
-    /// Loops in which nothing moves.
-    pub(crate) fn new(loops: impl Iterator<Item = &'a InnerLoop>) -> Self {
+    /// Loops in which nothing moves, around a G of these columns of B behind its dead time.
+    pub(crate) fn new(loops: impl Iterator<Item = &'a InnerLoop>, b: &[Vec<f64>]) -> Self {
         let loops: Vec<&InnerLoop> = loops.collect();
         let rest = |inner: &&InnerLoop| LoopSignals {
             z: 0.0,
@@ -59,7 +63,8 @@ impl<'a> Loops<'a> {
             marks: vec![0.0; inner.law.marks()],
             places: vec![0.0; inner.law.memories()],
         };
-        Self { signals: loops.iter().map(rest).collect(), loops }
+        let drives = loops.iter().map(|inner| inner.drives.column(b)).collect();
+        Self { signals: loops.iter().map(rest).collect(), drives, loops }
     }
 
     /// z and w of one sample, from the state of G (that of its dead time first), v and the displacements.
@@ -77,9 +82,9 @@ impl<'a> Loops<'a> {
 
     /// Adds E w to what drives the states of G.
     pub(crate) fn drive(&self, driven: &mut [f64]) {
-        for (inner, own) in self.loops.iter().zip(&self.signals) {
-            let first = driven.len() - inner.drives.len();
-            let driven = driven[first..].iter_mut().zip(&inner.drives);
+        for (drives, own) in self.drives.iter().zip(&self.signals) {
+            let first = driven.len() - drives.len();
+            let driven = driven[first..].iter_mut().zip(drives);
             driven.for_each(|(sum, drive)| *sum += drive * own.w);
         }
     }
@@ -101,6 +106,15 @@ impl Sees {
 }
 
 impl Law {
+    /// What it remembers where z has always been the same, and no force has built up.
+    pub(crate) fn at_rest(&self, z: f64) -> Vec<f64> {
+        let mut places = vec![z; self.memories()];
+        if let Self::BoucWen { .. } | Self::Dahl { .. } = self {
+            places[0] = 0.0;
+        }
+        places
+    }
+
     /// w at z.
     pub(crate) fn step(&self, places: &mut [f64], z: f64, marks: &mut [f64]) -> f64 {
         match self {
@@ -126,7 +140,27 @@ impl Law {
                 marks.copy_from_slice(&step.slopes);
                 step.force
             }
+            &Self::Dahl { distance, averaged } => {
+                let [f, w] = friction(places[0], [z, places[1], places[2]], distance, averaged);
+                places.copy_from_slice(&[f.value, z, places[1]]);
+                let (of_w, of_f) = marks.split_at_mut(w.slopes.len());
+                of_w.copy_from_slice(&w.slopes);
+                of_f.copy_from_slice(&f.slopes);
+                w.value
+            }
+            Self::Speed => {
+                let change = z - std::mem::replace(&mut places[0], z);
+                marks[0] = if change < 0.0 { -1.0 } else { 1.0 };
+                change.abs()
+            }
         }
+    }
+
+    /// The marks of a force that follows the path of z: derivatives of w and, where this is another number, of the force f that is
+    /// remembered, by f and z before, z, and the shape.
+    fn slopes<'a>(&self, marks: &'a [f64]) -> [&'a [f64]; 2] {
+        let (of_w, of_f) = marks.split_at(4 + self.shapes());
+        [of_w, of_f]
     }
 
     /// Changes of w by changes of z and of the shape; `places` are the changes of what is remembered.
@@ -153,13 +187,24 @@ impl Law {
                     add(simd, &mut w, -weight, place);
                 }
             }
-            Self::BoucWen { .. } => {
-                let [beta, gamma, exponent] = [shape[0], shape[1], shape[2]];
-                let changes = [places[0], z, places[1], places[2], beta, gamma, exponent];
-                for (mark, change) in marks.iter().zip(&changes) {
-                    add(simd, &mut w, *mark, change);
-                }
-                places.copy_from_slice(&[w, z, places[1]]);
+            Self::BoucWen { .. } | Self::Dahl { .. } => {
+                let changes = [places[0], z, places[1], places[2]];
+                let of = |marks: &[f64]| {
+                    let mut sum = NONE;
+                    for (mark, change) in marks.iter().zip(changes.iter().chain(shape)) {
+                        add(simd, &mut sum, *mark, change);
+                    }
+                    sum
+                };
+                let [of_w, of_f] = self.slopes(marks);
+                w = of(of_w);
+                let f = if of_f.is_empty() { w } else { of(of_f) };
+                places.copy_from_slice(&[f, z, places[1]]);
+            }
+            Self::Speed => {
+                add(simd, &mut w, marks[0], &z);
+                add(simd, &mut w, -marks[0], &places[0]);
+                places[0] = z;
             }
         }
         w
@@ -189,12 +234,19 @@ impl Law {
                     }
                 }
             }
-            Self::BoucWen { .. } => {
-                let force = places[0] + w;
-                z += places[1] + marks[1] * force;
-                shape.iter_mut().zip(&marks[4..]).for_each(|(own, mark)| *own = mark * force);
-                let older = [marks[2] * force + places[2], marks[3] * force];
-                places.copy_from_slice(&[marks[0] * force, older[0], older[1]]);
+            Self::Speed => {
+                z += places[0] + marks[0] * w;
+                places[0] = -marks[0] * w;
+            }
+            Self::BoucWen { .. } | Self::Dahl { .. } => {
+                let [of_w, of_f] = self.slopes(marks);
+                let f = places[0];
+                let of_f = if of_f.is_empty() { of_w } else { of_f };
+                let of = |place: usize| of_w[place] * w + of_f[place] * f;
+                z += places[1] + of(1);
+                shape.iter_mut().enumerate().for_each(|(place, own)| *own = of(4 + place));
+                let older = [of(2) + places[2], of(3)];
+                places.copy_from_slice(&[of(0), older[0], older[1]]);
             }
         }
         z

@@ -55,6 +55,7 @@
 pub(crate) mod adjoint;
 mod bouc_wen;
 pub(crate) mod bounds;
+mod dahl;
 mod effect_columns;
 mod forward;
 pub(crate) mod free_run;
@@ -82,3 +83,4 @@ pub(crate) mod stream;
 pub(crate) mod table;
 pub(crate) mod tangents;
 mod tiles;
+mod turning_point;

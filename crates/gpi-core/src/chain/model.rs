@@ -13,13 +13,15 @@
 //! G here is a state space whose dead time is a shift register among the states; a loop sees the v that leaves it. The
 //! estimator's [`super::point::Point`] has the same chain with G in sections and its dead time apart.
 
+use super::hysteresis::Parameters;
 use super::loops::Loops;
 use super::plays::Plays;
 use super::stages::Stages;
 use crate::effects::{
-    ClosedLoops, Coefficients, Effect, InnerLoop, ParallelSections, Place, Quantity, Units,
+    ClosedLoops, Coefficients, Effect, InnerLoop, ParallelSections, Place, Quantity, SteadyForce,
+    Units,
 };
-use crate::linear::advance;
+use crate::linear::{StateSpace, advance};
 use crate::model::{Model, ModelState};
 use crate::operators::{GpiState, Operator};
 use crate::{Channel, Error, Matrix};
@@ -121,8 +123,15 @@ impl Model {
             own.map_or(String::new(), |channel| channel.unit.clone())
         };
         let (input, output) = (unit(self.inputs()), unit(self.outputs()));
+        let b = behind_dead_time(self.linear());
+        let poles = self.linear().behind_dead_time().0.poles().unwrap_or_default();
         let gains = |drives: &[f64]| self.linear().gains_from_states(drives);
-        let force = |inner: &InnerLoop| inner.relative_force(gains);
+        let force = |inner: &InnerLoop| {
+            let over_stiffness = inner.relative_force(&b, gains)?;
+            let sensitivity = self.linear().dc_gain().ok()?[(0, 0)]
+                * Parameters::from_operator(&self.hysteresis()[0]).slope();
+            Some(SteadyForce::new(over_stiffness, sensitivity, &poles, self.rate()))
+        };
         effect.quantities(Units { input: &input, output: &output }, &force)
     }
 
@@ -245,7 +254,8 @@ impl Model {
         let linear = self.linear();
         let stages = self.stages(0);
         let mut closed: Vec<_> = stages.at(&mut state.effects, Place::closed_loops).collect();
-        let mut loops = Loops::new(closed.iter().flat_map(|(own, _)| own.loops()));
+        let all = closed.iter().flat_map(|(own, _)| own.loops());
+        let mut loops = Loops::new(all, &behind_dead_time(linear));
         let places = closed.iter().flat_map(|(_, memory)| memory.iter().copied());
         loops.places().zip(places).for_each(|(place, known)| *place = known);
         let mut drive = vec![0.0; linear.order()];
@@ -276,6 +286,12 @@ impl Model {
     ) {
         self.stages(state.sample).read(&mut state.effects, covariates, output);
     }
+}
+
+/// The columns of B behind the dead time.
+fn behind_dead_time(linear: &StateSpace) -> Vec<Vec<f64>> {
+    let (own, _) = linear.behind_dead_time();
+    own.b().column_iter().map(|column| column.iter().copied().collect()).collect()
 }
 
 /// The delay line and the states of an effect's sections after a constant v.

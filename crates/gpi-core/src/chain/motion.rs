@@ -15,7 +15,7 @@
 //! A section of order one is `A = [-a1]`. C is (outputs, N), D (outputs, inputs), B (N, inputs), E (N, loops) with rows
 //! of zeros for sections in parallel with G. A step costs about `N (outputs + inputs + 2 loops + 1)` multiplications.
 //!
-//! The steady state at a constant v is `x = (I - A)^-1 B v` (`Section::standing`). It is exact for the linear part; a
+//! The steady state at a constant v is `x = (I - A)^-1 B v` (`Section::standing`, which says what takes its place where G integrates). It is exact for the linear part; a
 //! loop that feeds back at rest is not part of it, so that the state settles from there in the decay time of the closed
 //! loop.
 
@@ -48,12 +48,13 @@ impl<'a> Motion<'a> {
     pub(crate) fn new(point: &'a Point) -> Self {
         let sections = point.sections();
         let (outputs, inputs) = point.dynamics.d.shape();
+        let b = columns(&sections, inputs);
         Self {
-            b: columns(&sections, inputs),
+            loops: Loops::new(point.loops(), &b),
+            b,
             c: sections.iter().flat_map(|section| section.c.as_slice()).copied().collect(),
             d: point.dynamics.d.transpose().as_slice().to_vec(),
             own: point.dynamics.order(),
-            loops: Loops::new(point.loops()),
             state: vec![0.0; point.order()],
             displacement: vec![0.0; outputs],
             drive: vec![0.0; point.order()],

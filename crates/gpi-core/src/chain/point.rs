@@ -16,7 +16,7 @@
 use crate::Matrix;
 use crate::chain::hysteresis::Parameters;
 use crate::chain::sensitivity::Derivatives;
-use crate::effects::{Coefficients, Effect, OutputStage, PlaceMut};
+use crate::effects::{Coefficients, Effect, InnerLoop, OutputStage, PlaceMut, SteadyForce};
 use crate::linear::{Section, Sections};
 use nalgebra::DVector;
 use std::ops::Range;
@@ -63,8 +63,9 @@ pub(crate) enum DynamicsFreedom {
 /// Which parameters are free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Freedom {
-    /// Weights, slopes and offsets.
+    /// Weights, slopes and the values of effects.
     pub weights: bool,
+    pub offsets: bool,
     /// Thresholds, half-widths, initial places of plays.
     pub derivatives: Derivatives,
     /// Unknown initial states of the sections.
@@ -172,6 +173,17 @@ impl Point {
             }
         }
         effects
+    }
+
+    /// The force of a loop in steady state, where it is known.
+    pub(crate) fn steady_force(&self, inner: &InnerLoop) -> Option<SteadyForce> {
+        let inputs = 0..self.channels.len();
+        let b: Vec<Vec<f64>> =
+            inputs.map(|input| self.dynamics.driven_by(input).collect()).collect();
+        let gains = |drives: &[f64]| Some(self.dynamics.gains_from_states(drives));
+        let over_stiffness = inner.relative_force(&b, gains)?;
+        let sensitivity = self.dynamics.dc_gain()[(0, 0)] * self.channels[0].slope();
+        Some(SteadyForce::new(over_stiffness, sensitivity, &self.dynamics.poles(), self.rate))
     }
 
     /// The effects of the output stage.

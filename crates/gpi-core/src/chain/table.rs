@@ -99,6 +99,8 @@ use Group::{
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Table {
     rows: Vec<(Group, Range<usize>)>,
+    /// Whether loops are closed around G.
+    has_loops: bool,
     /// How many unknowns there are.
     pub len: usize,
 }
@@ -114,7 +116,7 @@ impl Table {
             (group, first..len)
         };
         let rows = free.map(row).collect();
-        Self { rows, len }
+        Self { rows, has_loops: point.loops().next().is_some(), len }
     }
 
     /// All rows in the order of the unknowns.
@@ -136,7 +138,7 @@ impl Table {
             rows.push((*group, places.len()..places.len() + range.len()));
             places.extend(range.clone());
         }
-        (Self { rows, len: places.len() }, places)
+        (Self { rows, has_loops: self.has_loops, len: places.len() }, places)
     }
 
     /// The unknowns of each experiment that move no other one's output. The only experiment has none: nothing else
@@ -158,10 +160,14 @@ impl Table {
         self.rows.get(row).map(|(group, range)| (*group, unknown - range.start))
     }
 
-    /// Whether the output is linear in an unknown while all others are kept. That is exact without loops and without an
-    /// output stage, and otherwise what the solver assumes when it leaves these unknowns undamped.
+    /// Whether the output is linear in an unknown while all others are kept. That is exact without an output stage, and otherwise
+    /// what the solver assumes when it leaves these unknowns undamped. v goes around loops, and so do the states.
     pub(crate) fn is_linear(&self, unknown: usize) -> bool {
-        matches!(self.at(unknown), Some((Weights { .. } | Offsets { .. } | State { .. }, _)))
+        match self.at(unknown) {
+            Some((Offsets { .. }, _)) => true,
+            Some((Weights { .. } | State { .. }, _)) => !self.has_loops,
+            _ => false,
+        }
     }
 
     /// The value of every unknown.
@@ -218,9 +224,10 @@ impl Group {
             }
             Numerator { .. } | ParallelNumerator { .. } => dynamics != DynamicsFreedom::Nothing,
             Observer { .. } => dynamics != DynamicsFreedom::Nothing && point.dynamics.outputs() > 1,
-            // the held DC gain sets one element of each column
+            // a held DC gain sets one element of the column, else the whole column is held
             Feedthrough { input, output } => {
-                dynamics != DynamicsFreedom::Nothing && point.dynamics.held[input].0 != output
+                let held = point.dynamics.held[input];
+                dynamics != DynamicsFreedom::Nothing && held.is_some_and(|held| held.0 != output)
             }
             Effect { place } => point.effects[place].place().parallel_sections().is_none(),
             Plays { experiment, .. } => {

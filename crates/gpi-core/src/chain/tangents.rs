@@ -102,11 +102,12 @@ impl<'a> Tangents<'a> {
             Sees::Output(_) => vec![0.0; order],
             Sees::Mixture { states, .. } => padded(states, order),
         }));
+        let b = columns(&sections, dynamics.inputs());
         let drives: Vec<Vec<f64>> =
-            loops.iter().map(|inner| padded(&inner.drives, order)).collect();
+            loops.iter().map(|inner| padded(&inner.drives.column(&b), order)).collect();
         Self {
             seen: Weights::new(&seen),
-            driven: Weights::new(&columns(&sections, dynamics.inputs())),
+            driven: Weights::new(&b),
             circulating: Weights::new(&drives),
             d: &dynamics.d,
             loops,

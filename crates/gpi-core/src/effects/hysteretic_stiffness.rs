@@ -7,7 +7,7 @@
 //! times 1 / beta.
 
 use super::properties::{FreeOrder, SeparatedBy, Signature};
-use super::{ClosedLoops, InnerLoop, Law, Proposal, Sees, Situation, Stage};
+use super::{ClosedLoops, Drives, InnerLoop, Law, Proposal, Sees, Situation, Stage};
 
 /// A loop around G through Bouc and Wen's force: `x+ = A x + B v + E w`, w the force of [`Law::BoucWen`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -46,7 +46,8 @@ impl HystereticStiffness {
         }
         let around = |sharpness: f64| {
             let law = Law::BoucWen { beta: sharpness / rms, gamma: 0.0, exponent: 1.0 };
-            let inner = InnerLoop { sees: Sees::Output(0), law, drives: vec![0.0; order] };
+            let inner =
+                InnerLoop { sees: Sees::Output(0), law, drives: Drives::States(vec![0.0; order]) };
             Proposal::linear(HystereticStiffness { loops: vec![inner] }, 0..order)
         };
         SHARPNESS.map(around).to_vec()

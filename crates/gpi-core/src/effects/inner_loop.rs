@@ -2,7 +2,7 @@
 
 /// `w = law(z)`, and `w(k)` drives the states of G for sample k + 1: `x+ = A x + B v + E w`.
 ///
-/// No loop is algebraic, because w acts one sample later. With [`Law::Stops`] w is bounded, so that a stable
+/// No loop is algebraic, because w acts one sample later. With [`Law::Stops`] and [`Law::Dahl`] w is bounded, so that a stable
 /// G stays bounded for any gain of the loop; with [`Law::BoucWen`] it is where `beta + gamma > 0`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct InnerLoop {
@@ -10,8 +10,46 @@ pub struct InnerLoop {
     pub sees: Sees,
     /// The law from z to w.
     pub law: Law,
-    /// A column of E, by the states of G; those of its dead time, which come first, are not driven.
-    pub drives: Vec<f64>,
+    /// What w drives.
+    pub drives: Drives,
+}
+
+/// Where w enters G: a column of E.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(untagged)]
+pub enum Drives {
+    /// By the states of G; those of its dead time, which come first, are not driven.
+    States(Vec<f64>),
+    /// `E = -force b` with the column b of B by which an input enters the states behind the dead time: w is a force where the input is
+    /// one, and takes away so much of v.
+    Input {
+        /// The input.
+        input: usize,
+        /// In the unit of v over that of w.
+        force: f64,
+        /// The number of states behind the dead time.
+        states: usize,
+    },
+}
+
+impl Drives {
+    /// The number of states that are driven.
+    pub(crate) fn states(&self) -> usize {
+        match self {
+            Self::States(column) => column.len(),
+            Self::Input { states, .. } => *states,
+        }
+    }
+
+    /// The column of E, from the columns of B behind the dead time.
+    pub(crate) fn column(&self, b: &[Vec<f64>]) -> Vec<f64> {
+        match self {
+            Self::States(column) => column.clone(),
+            Self::Input { input, force, states } => {
+                b[*input][..*states].iter().map(|b| -force * b).collect()
+            }
+        }
+    }
 }
 
 /// The input z of a loop's law.
@@ -59,30 +97,48 @@ pub enum Law {
         /// n, at least 1: how suddenly the force reaches its limit.
         exponent: f64,
     },
+    /// `df = (dz - |dz| f) / distance`: Dahl's friction f, between -1 and 1. Over a change of one direction f approaches its
+    /// sign as `exp(-|dz| / distance)`; Coulomb's friction is the limit of a short distance. w is f, or
+    /// `w(k) = m(k) + f(k) - f(k - 1)` with the mean m of f over the last sample.
+    ///
+    /// P. R. Dahl, *Solid friction damping of mechanical vibrations*, AIAA Journal 14, 1976.
+    Dahl {
+        /// The break-away distance in the unit of z, positive: the force over the stiffness of the contact at rest.
+        distance: f64,
+        /// Whether w is exact in the mean: where f changes its sign within a sample, and w acts like an input that is held.
+        averaged: bool,
+    },
+    /// `w(k) = |z(k) - z(k - 1)|`: the speed without its sign. A force in proportion to it is the part of viscous friction by
+    /// which the two directions differ.
+    Speed,
 }
 
 impl Law {
-    /// The number of values that it remembers: the places of the plays of stops; w and the last two z of Bouc and Wen's force.
+    /// The number of values that it remembers: the places of the plays of stops; the force and the last two z where it follows the
+    /// path of z; the last z for the speed.
     pub(crate) fn memories(&self) -> usize {
         match self {
             Self::Power { .. } => 0,
             Self::Stops { half_widths, .. } => half_widths.len(),
-            Self::BoucWen { .. } => 3,
+            Self::BoucWen { .. } | Self::Dahl { .. } => 3,
+            Self::Speed => 1,
         }
     }
 
-    /// The number of values to which w does not respond linearly: the half-widths of stops; beta, gamma and the exponent.
+    /// The number of values to which w does not respond linearly: the half-widths of stops; beta, gamma and the exponent; the
+    /// break-away distance.
     pub(crate) fn shapes(&self) -> usize {
         match self {
-            Self::Power { .. } => 0,
+            Self::Power { .. } | Self::Speed => 0,
             Self::Stops { half_widths, .. } => half_widths.len(),
             Self::BoucWen { .. } => 3,
+            Self::Dahl { .. } => 1,
         }
     }
 
     /// Whether it dissipates energy by a force that must oppose the displacement.
     pub(crate) fn is_dissipative(&self) -> bool {
-        matches!(self, Self::BoucWen { .. })
+        matches!(self, Self::BoucWen { .. } | Self::Dahl { .. })
     }
 
     /// The number of weights of a sum.
@@ -93,9 +149,11 @@ impl Law {
     /// The number of marks that a step leaves for derivatives.
     pub(crate) fn marks(&self) -> usize {
         match self {
-            Self::Power { .. } => 1,
+            Self::Power { .. } | Self::Speed => 1,
             Self::Stops { half_widths, .. } => half_widths.len().max(1),
-            Self::BoucWen { .. } => 7,
+            Self::BoucWen { .. } => 4 + self.shapes(),
+            // those of the force that is remembered, too
+            Self::Dahl { .. } => 2 * (4 + self.shapes()),
         }
     }
 
@@ -108,29 +166,38 @@ impl Law {
 impl InnerLoop {
     /// Takes states of G into account that it neither drives nor sees, behind its own.
     pub(crate) fn add_states(&mut self, count: usize) {
-        self.drives.resize(self.drives.len() + count, 0.0);
+        match &mut self.drives {
+            Drives::States(column) => column.resize(column.len() + count, 0.0),
+            Drives::Input { states, .. } => *states += count,
+        }
         if let Sees::Mixture { states, .. } = &mut self.sees {
             states.resize(states.len() + count, 0.0);
         }
     }
 
     /// The force of w = 1 on the displacement that the loop sees, relative to the linear stiffness: positive where it opposes the
-    /// displacement. `gains` are the outputs in steady state where a column of E is added to the states; `None` where z is no
-    /// displacement, or nothing stands still.
+    /// displacement. `b` are the columns of B behind the dead time, and `gains` the outputs in steady state where a column of E is added
+    /// to the states; `None` where z is no displacement, or nothing stands still.
     ///
     /// From `y = g v + h w` in steady state, `y / g = v + (h / g) w`: the linear stiffness is 1 / g, and w opposes y with the
     /// force `-h / g`.
     pub(crate) fn relative_force(
         &self,
+        b: &[Vec<f64>],
         gains: impl Fn(&[f64]) -> Option<nalgebra::DVector<f64>>,
     ) -> Option<f64> {
         let Sees::Output(output) = self.sees else { return None };
-        gains(&self.drives).map(|gains| -gains[output]).filter(|force| force.is_finite())
+        gains(&self.drives.column(b)).map(|gains| -gains[output]).filter(|force| force.is_finite())
     }
 
     /// Why it is invalid around a G of so many states, inputs and outputs; `None` where it is valid.
     pub(crate) fn flaw(&self, states: usize, inputs: usize, outputs: usize) -> Option<String> {
-        let drives = self.drives.len();
+        let drives = self.drives.states();
+        if let Drives::Input { input, .. } = self.drives
+            && input >= inputs
+        {
+            return Some(format!("drives input {input} of {inputs}"));
+        }
         if drives > states {
             return Some(format!("drives {drives} states, but the dynamics have {states}"));
         }
@@ -160,6 +227,9 @@ impl InnerLoop {
             }
             Law::BoucWen { beta, .. } if beta.is_nan() || *beta < 0.0 => {
                 Some(format!("has beta = {beta}, but a force that dissipates energy has beta >= 0"))
+            }
+            Law::Dahl { distance, .. } if distance.is_nan() || *distance <= 0.0 => {
+                Some(format!("has the break-away distance {distance}, but it must be positive"))
             }
             Law::BoucWen { exponent, .. } if exponent.is_nan() || *exponent < 1.0 => {
                 Some(format!("has the exponent {exponent}, but it must be at least 1"))

@@ -117,6 +117,7 @@ mod tests {
     use crate::chain::looped::{model, record, run};
     use crate::chain::point::{DynamicsFreedom, Freedom};
     use crate::chain::sensitivity::Derivatives;
+    use crate::effects::Effect;
     use crate::explain::base::Base;
     use crate::fit::preparation::Prepared;
     use crate::optimize::Loss;
@@ -128,6 +129,7 @@ mod tests {
         let point = prepared.point_of(model).unwrap();
         let freedom = Freedom {
             weights: true,
+            offsets: true,
             derivatives: Derivatives { thresholds: false, half_widths: false, starts: false },
             states: false,
             identity: true,
@@ -149,7 +151,14 @@ mod tests {
         let found = next(&plain);
         assert_eq!(found.iter().map(|family| family.0).collect::<Vec<_>>(), [true, false]);
         assert_eq!(found[0].1, found[1].1, "both of the displacements");
-        // with two loops of stops and one of a power, the next signals are v
-        assert_eq!(next(&model), [(true, vec![0.0, 1.0])]);
+        // with two loops that have a memory and one of a power, the next signals are v
+        let mut effects = model.effects().to_vec();
+        for effect in &mut effects {
+            if let Effect::Stiffness(own) = effect {
+                own.loops.truncate(3);
+            }
+        }
+        let three = model.with_effects(effects).unwrap();
+        assert_eq!(next(&three), [(true, vec![0.0, 1.0])]);
     }
 }

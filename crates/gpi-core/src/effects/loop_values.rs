@@ -1,10 +1,10 @@
 //! The values of loops around G: what is estimated, in which limits, and what it is called.
 //!
 //! The values of a loop are its column of E, its rows of S and T, and those of its law: the logarithms of the half-widths
-//! of stops and their weights, or beta, gamma and the exponent. The product of E, the scale of the signal and the scale of w is what the
+//! of stops and their weights, beta, gamma and the exponent, or the logarithm of a break-away distance. The product of E, the scale of the signal and the scale of w is what the
 //! output shows; therefore the largest element of S and T, or the widest half-width and the last weight of stops, are held.
 
-use super::{Block, ClosedLoops, InnerLoop, Law, Quantity, Sees, Units};
+use super::{Block, ClosedLoops, Drives, InnerLoop, Law, Quantity, Sees, SteadyForce, Units};
 
 impl<T: ClosedLoops> Block for T {
     fn values(&self) -> Vec<f64> {
@@ -44,12 +44,18 @@ enum Group<'a> {
 
 /// The values of a loop, in order.
 fn groups(inner: &mut InnerLoop) -> Vec<Group<'_>> {
-    let mut groups = vec![Group::Plain(&mut inner.drives)];
+    let mut groups = vec![Group::Plain(match &mut inner.drives {
+        Drives::States(column) => column,
+        Drives::Input { force, .. } => std::slice::from_mut(force),
+    })];
     if let Sees::Mixture { states, inputs } = &mut inner.sees {
         groups.extend([Group::Plain(states), Group::Plain(inputs)]);
     }
     match &mut inner.law {
-        Law::Power { .. } => {}
+        Law::Power { .. } | Law::Speed => {}
+        Law::Dahl { distance, .. } => {
+            groups.push(Group::Logarithms(std::slice::from_mut(distance)));
+        }
         Law::Stops { half_widths, weights } => {
             groups.extend([Group::Logarithms(half_widths), Group::Plain(weights)]);
         }
@@ -95,7 +101,10 @@ fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
     let free = |count: usize| vec![(f64::NEG_INFINITY, f64::INFINITY); count];
     let mut bounds = Vec::new();
     for inner in loops {
-        bounds.extend(free(inner.drives.len()));
+        bounds.extend(free(match &inner.drives {
+            Drives::States(column) => column.len(),
+            Drives::Input { .. } => 1,
+        }));
         if let Sees::Mixture { states, inputs } = &inner.sees {
             let seen = || states.iter().chain(inputs);
             bounds.extend(free(states.len() + inputs.len()));
@@ -113,6 +122,11 @@ fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
             const SHARPEST: f64 = 4.0;
             bounds.extend([(0.0, f64::INFINITY), (f64::NEG_INFINITY, f64::INFINITY)]);
             bounds.push((1.0, SHARPEST));
+        }
+        if let Law::Dahl { distance, .. } = &inner.law {
+            /// The largest step of the logarithm of the break-away distance.
+            const STEP: f64 = 0.5;
+            bounds.push((distance.ln() - STEP, distance.ln() + STEP));
         }
         if let Law::Stops { half_widths, weights } = &inner.law {
             /// Largest distance of a half-width from the widest one, in logarithms: a factor of a thousand.
@@ -150,7 +164,10 @@ fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
             };
             found.extend(named.map(quantity));
         };
-        list("drive", &inner.drives, true);
+        // a force is printed as what it is in steady state
+        if let Drives::States(column) = &inner.drives {
+            list("drive", column, true);
+        }
         if let Sees::Mixture { states, inputs } = &inner.sees {
             list("seen_state", states, false);
             list("seen_input", inputs, false);
@@ -158,6 +175,9 @@ fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
         if let Law::Stops { half_widths, weights } = &inner.law {
             list("half_width", half_widths, false);
             list("weight", weights, true);
+        }
+        if let Law::Dahl { distance, .. } = &inner.law {
+            found.push(Quantity::new("break_away_distance", units.output, *distance));
         }
         if let Law::BoucWen { beta, gamma, exponent } = &inner.law {
             // z is a displacement
@@ -177,13 +197,15 @@ fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
 ///
 /// A power n of the displacement z adds `k_n z^n` to the linear force `k_1 z`; `kn_over_k1` is their ratio. The force of Bouc
 /// and Wen is `k_h w` with `w = z` for small motion; `hysteretic_over_linear` is `k_h / k_1`.
+///
+/// Friction is printed in the unit of the input, of which it takes away so much, and beside it mass, damping and stiffness of the mechanics.
 pub(super) fn in_steady_state(
     loops: &[InnerLoop],
     units: Units,
-    relative_force: &dyn Fn(&InnerLoop) -> Option<f64>,
+    forces: &dyn Fn(&InnerLoop) -> Option<SteadyForce>,
 ) -> Vec<Quantity> {
     let of = |(q, inner): (usize, &InnerLoop)| {
-        let force = relative_force(inner)?;
+        let SteadyForce { over_stiffness: force, of_input, period, .. } = forces(inner)?;
         let (name, unit, value) = match &inner.law {
             Law::Power { exponent, scale } => {
                 let unit = match (units.output, exponent - 1) {
@@ -199,8 +221,32 @@ pub(super) fn in_steady_state(
                 (format!("hysteretic_over_linear[{q}]"), String::new(), value)
             }
             Law::BoucWen { .. } => (format!("hysteretic_over_linear[{q}]"), String::new(), force),
+            Law::Dahl { .. } => ("friction_force".to_owned(), units.input.to_owned(), of_input),
+            // |dz| is the speed times the period
+            Law::Speed => {
+                let unit = per_derivative(units, " s");
+                ("asymmetry".to_owned(), unit, period * of_input)
+            }
         };
         Some(Quantity::strength(name, unit, value))
     };
-    loops.iter().enumerate().filter_map(of).collect()
+    let mut found: Vec<Quantity> = loops.iter().enumerate().filter_map(of).collect();
+    let rubs = |inner: &&InnerLoop| matches!(inner.law, Law::Dahl { .. });
+    let rubbing = loops.iter().find(rubs).and_then(forces);
+    if let Some([mass, damping, stiffness]) = rubbing.and_then(|force| force.mechanics) {
+        found.push(Quantity::new("mass", per_derivative(units, " s^2"), mass));
+        found.push(Quantity::strength("damping", per_derivative(units, " s"), damping));
+        found.push(Quantity::strength("stiffness", per_derivative(units, ""), stiffness));
+    }
+    found
+}
+
+/// The unit of the input over that of a derivative of the output.
+fn per_derivative(units: Units, seconds: &str) -> String {
+    match (units.input, units.output) {
+        ("", "") => seconds.trim().to_owned(),
+        (input, "") => format!("{input}{seconds}"),
+        ("", output) => format!("1{seconds}/{output}"),
+        (input, output) => format!("{input}{seconds}/{output}"),
+    }
 }

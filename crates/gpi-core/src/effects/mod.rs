@@ -17,9 +17,10 @@ mod properties;
 mod proposal;
 mod quantity;
 mod situation;
+mod steady_force;
 
 pub use block::Block;
-pub use inner_loop::{InnerLoop, Law, Sees};
+pub use inner_loop::{Drives, InnerLoop, Law, Sees};
 pub use place::{
     Added, ClosedLoops, Coefficients, Finding, InputStage, Moment, OutputStage, ParallelSections,
     Place, PlaceMut, PlayCurves, PlayRead, PlayWidths, Slope, Stage,
@@ -27,6 +28,7 @@ pub use place::{
 pub use properties::{FreeOrder, SeparatedBy, Signature};
 pub use quantity::{Quantity, Units};
 pub use rate_dependence::SpeedLaw;
+pub use steady_force::SteadyForce;
 
 pub(crate) use creep::longest_lag;
 pub(crate) use names::entries;
@@ -111,6 +113,7 @@ catalogue! {
     creep::Creep: Parallel,
     stiffness::Stiffness: Loops,
     hysteretic_stiffness::HystereticStiffness: Loops,
+    friction::Friction: Loops,
     output_nonlinearity::OutputNonlinearity: Output,
     gain_drift::GainDrift: Output,
     backlash::Backlash: Output,
@@ -192,17 +195,17 @@ impl Effect {
         }
     }
 
-    /// The parameters as an engineer reads them, with their units. `relative_force` is that of loops in steady state, where it
-    /// is known (see [`ClosedLoops::in_steady_state`]).
+    /// The parameters as an engineer reads them, with their units. `forces` are those of loops in steady state, where they
+    /// are known (see [`ClosedLoops::in_steady_state`]).
     pub fn quantities(
         &self,
         units: Units,
-        relative_force: &dyn Fn(&InnerLoop) -> Option<f64>,
+        forces: &dyn Fn(&InnerLoop) -> Option<SteadyForce>,
     ) -> Vec<Quantity> {
         match self.place() {
             Place::Finding(own) => own.quantities(units),
             Place::Loops(own) => {
-                let mut found = own.in_steady_state(units, relative_force);
+                let mut found = own.in_steady_state(units, forces);
                 found.extend(own.quantities(units));
                 found
             }
@@ -283,7 +286,7 @@ mod tests {
         let record =
             Record::new(vec![run], 100.0, channel("u"), channel("y"), channel("x")).unwrap();
         let (b, c) = (Matrix::from_element(2, 1, 0.1), Matrix::from_row_slice(1, 2, &[1.0, 0.0]));
-        let mode = Section { a: vec![-1.2, 0.6], b, c, reference: 0 };
+        let mode = Section { a: vec![-1.2, 0.6], b, c, reference: 0, at: 1.0 };
         ask(&Situation {
             record: &record,
             drives: &signals,

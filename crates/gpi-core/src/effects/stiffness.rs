@@ -13,7 +13,7 @@
 
 use super::loop_signals::{LoopSignal, Shape, families};
 use super::properties::{FreeOrder, SeparatedBy, Signature};
-use super::{Block, ClosedLoops, InnerLoop, Law, Proposal, Sees, Situation, Stage};
+use super::{Block, ClosedLoops, Drives, InnerLoop, Law, Proposal, Sees, Situation, Stage};
 
 /// Nonlinear loops around G: `x+ = A x + B v + E w`, `w = law(S x + T v)`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -63,7 +63,7 @@ fn powers(situation: &Situation) -> Vec<Proposal<Stiffness>> {
     let power = |exponent| InnerLoop {
         sees: Sees::Output(0),
         law: Law::Power { exponent, scale },
-        drives: vec![0.0; order],
+        drives: Drives::States(vec![0.0; order]),
     };
     let block = Stiffness { loops: [2, 3].map(power).to_vec() };
     [order..2 * order, 0..2 * order].map(|places| Proposal::linear(block.clone(), places)).to_vec()
@@ -89,7 +89,7 @@ fn around(
     let inner = moving.map(|signal| InnerLoop {
         sees: signal.sees(),
         law: law(signal.rms()),
-        drives: vec![0.0; order],
+        drives: Drives::States(vec![0.0; order]),
     });
     let block = Stiffness { loops: inner.collect() };
     let mut first = 0;

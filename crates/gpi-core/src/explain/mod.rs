@@ -20,6 +20,8 @@ mod concurrently;
 mod examination;
 mod exchange;
 mod explanation;
+mod force_balance;
+mod forces;
 mod grid;
 mod judgement;
 mod moved_resonance;

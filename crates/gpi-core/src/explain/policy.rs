@@ -17,6 +17,8 @@ pub(crate) struct SearchPolicy {
     pub ranking: RankingPolicy,
     /// How long they are fitted.
     pub fits: FitPolicy,
+    /// Which forces inside the mechanics are fitted too.
+    pub balance: BalancePolicy,
     /// Which of them are accepted.
     pub judgement: JudgementPolicy,
     /// Whether the accepted trial has earned its name.
@@ -40,6 +42,7 @@ impl SearchPolicy {
         self.grid.validate()?;
         self.ranking.validate()?;
         self.fits.validate()?;
+        self.balance.validate()?;
         self.judgement.validate()?;
         self.examination.validate()?;
         self.revision.validate()?;
@@ -127,6 +130,8 @@ settings! {
     struct FitPolicy {
         /// Steps of a trial. A trial is only compared with other trials; what is found is refined at the end.
         steps: usize = 12, FROM_ONE;
+        /// Steps of a trial that begins far from the present model. By hand.
+        far_steps: usize = 60, FROM_ONE;
         /// Part of the squares below which a step of a trial is the last. By hand, far below any threshold.
         gain: f64 = 1e-5, PART;
         /// Times that a trial goes on which is still making progress, and what that means: its last steps, so many,
@@ -145,6 +150,23 @@ settings! {
         /// The last refinement ends at this factor times the usual gain, which is a tenth of what a superfluous
         /// parameter gains on average: finer steps would fit noise.
         coarser: f64 = 10.0, FROM_ONE;
+    }
+
+    /// What the balance of forces must show, see [`force_balance`](super::force_balance).
+    struct BalancePolicy {
+        /// The first poles of the filter, over the rms change of the output from sample to sample relative to its standard
+        /// deviation: faster than the motion, so that all of it takes part. By hand.
+        faster: f64 = 3.0, POSITIVE;
+        /// Iterations of the filter. By hand: the poles settle within three.
+        iterations: usize = 5, FROM_ONE;
+        /// Slowest pole of the filter in radians over the length of the record: four periods. What is slower cannot be told from
+        /// the start.
+        slowest: f64 = 25.0, POSITIVE;
+        /// The same of the mechanics that a fit begins at: one that integrates has a pole at zero, which the fit finds from there.
+        least_pole: f64 = 0.1, POSITIVE;
+        /// The part of the squares that forces must explain. In simulations of linear stages they explain up to 0.08, true ones from
+        /// 0.34.
+        least: f64 = 0.15, PART;
     }
 
     /// Which trial is accepted, see [`judgement`](super::judgement).

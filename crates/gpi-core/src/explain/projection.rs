@@ -156,7 +156,7 @@ mod tests {
     use crate::chain::looped::{model, record, run};
     use crate::chain::point::{DynamicsFreedom, Freedom};
     use crate::chain::sensitivity::Derivatives;
-    use crate::effects::{InnerLoop, Law, Sees, Stiffness};
+    use crate::effects::{Drives, InnerLoop, Law, Sees, Stiffness};
     use crate::fit::preparation::Prepared;
     use crate::optimize::Loss;
 
@@ -169,6 +169,7 @@ mod tests {
         let point = prepared.point_of(&model).unwrap();
         let freedom = Freedom {
             weights: true,
+            offsets: true,
             derivatives: Derivatives { thresholds: false, half_widths: false, starts: false },
             states: false,
             identity: true,
@@ -179,7 +180,7 @@ mod tests {
         let inner = |law| InnerLoop {
             sees: Sees::Mixture { states: vec![0.3, 0.5, -0.2], inputs: vec![0.1, 0.2] },
             law,
-            drives: vec![0.0; 3],
+            drives: Drives::States(vec![0.0; 3]),
         };
         let stops = Law::Stops { half_widths: vec![0.1, 0.6], weights: vec![0.5, 1.0] };
         let square = Law::Power { exponent: 2, scale: 1.5 };

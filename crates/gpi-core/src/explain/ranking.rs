@@ -36,6 +36,8 @@ pub(super) struct Ranked {
     pub score: Score,
     /// By how much its deviance exceeds the price of its parameters in the BIC.
     pub worth: f64,
+    /// The model to begin at, where that is not the present model with the effect.
+    pub start: Option<Point>,
 }
 
 /// The best candidate of each effect that promises something, the most promising first.
@@ -89,7 +91,7 @@ pub(super) fn scored_beside(
         }
         let deviance = promised(values, score.gain);
         let worth = deviance - score.columns as f64 * values.ln();
-        keep_best(&mut best, Ranked { entry, score, worth });
+        keep_best(&mut best, Ranked { entry, score, worth, start: None });
     }
     best.sort_by(|a: &Ranked, b| b.worth.total_cmp(&a.worth));
     Ok(best)

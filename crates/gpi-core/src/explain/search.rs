@@ -2,6 +2,7 @@
 
 use super::examination::{doubt, examine};
 use super::exchange::{exchange_slow, prefer_driven};
+use super::forces::{Balanced, balanced, forces};
 use super::grid::refine_grids;
 use super::judgement::{Evidence, Refusal, choose, judge, refusal};
 use super::probability::probabilities;
@@ -14,6 +15,7 @@ use crate::Error;
 use crate::effects::{Entry, FreeOrder, Signature, Stage};
 use crate::fit::minimize::Fitted;
 use crate::progress::{Progress, as_trial, reached};
+use std::collections::BTreeSet;
 
 /// Adds effects until nothing more is confirmed and all that was named passes the last examination. An effect that
 /// replaces another one at the end of a round may need more terms, or leave room for more effects, so that the search
@@ -85,16 +87,27 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
         return Ok(false);
     }
     best.truncate(policy.fitted);
+    best.extend(forces(state, progress)?);
     let (mut trials, mut failed) = (Vec::new(), Vec::new());
     for tried in trials_of(state, best, progress)? {
         tried.map_or_else(|one| failed.push(one), |trial| trials.push(trial));
     }
+    // one that diverges on what is held out predicts nothing
+    trials.retain(|trial| trial.held_out.iter().all(|squares| squares.is_finite()));
     // by what is explained beyond the significance threshold
     trials.sort_by(|a, b| (b.deviance - b.threshold).total_cmp(&(a.deviance - a.threshold)));
+    // of two fits of the same effect, the better one
+    let mut names = BTreeSet::new();
+    trials.retain(|trial| names.insert(trial.entry.name));
     let before = state.held_out(&state.point)?;
     let noise = state.noise_squares()?;
-    let evidence = |trial| evidence(state, trial, noise, &before);
-    let mut evidences: Vec<Evidence> = trials.iter().map(evidence).collect();
+    let balanced: Vec<_> =
+        trials.iter().map(|trial| balanced(state, trial)).collect::<Result<_, _>>()?;
+    let mut evidences: Vec<Evidence> = trials
+        .iter()
+        .zip(&balanced)
+        .map(|(trial, balanced)| evidence(state, trial, noise, &before, balanced.as_ref()))
+        .collect();
     let judgement = &state.setup.policy.judgement;
     let measured = state.setup.policy.examination.measured_instead;
     let mut better: Option<Fitted> = None;
@@ -151,13 +164,22 @@ fn evidence<'a>(
     trial: &'a Trial,
     noise: f64,
     before: &'a [f64],
+    balanced: Option<&'a Balanced>,
 ) -> Evidence<'a> {
+    let is_worse = trial.held_out.iter().sum::<f64>() > before.iter().sum::<f64>();
+    let of_output = ([state.cost, trial.cost], [before, &trial.held_out[..]]);
+    let (squares, held_out) =
+        balanced.map_or(of_output, |own| (own.squares, [&own.held_out[0][..], &own.held_out[1]]));
     Evidence {
-        deviance: trial.deviance,
+        deviance: if balanced.is_some() {
+            state.prepared.values() * (squares[0] / squares[1]).ln()
+        } else {
+            trial.deviance
+        },
         threshold: trial.threshold,
-        squares: [state.cost, trial.cost],
+        squares,
         noise,
-        held_out: [before, &trial.held_out],
+        held_out,
         is_driven: trial.is_driven,
         is_unique: trial.entry.signature == Signature::Unique,
         is_more: state.is_more(trial.entry),
@@ -165,7 +187,7 @@ fn evidence<'a>(
         is_measured: trial.entry.driven && trial.entry.stage == Stage::Added,
         is_slow: trial.entry.signature == Signature::SlowInTime,
         is_added: trial.entry.stage == Stage::Added,
-        doubt: None,
+        doubt: (balanced.is_some() && is_worse).then_some(Refusal::Unconfirmed),
     }
 }
 

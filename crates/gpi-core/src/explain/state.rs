@@ -12,6 +12,7 @@
 //! for a block. The squares that noise alone would leave are `K sum_o w_o^2 s_o^2`, with K scored samples and the noise
 //! floor s_o of each output.
 
+use super::outside::integrates;
 use super::repair::{everything, repaired};
 use super::setup::SearchSetup;
 use crate::chain::point::Point;
@@ -23,7 +24,9 @@ use crate::identify::NoiseFloor;
 use crate::progress::Progress;
 use crate::uncertainty::outliers;
 use crate::{Error, Record};
+
 use std::collections::BTreeSet;
+use std::sync::OnceLock;
 
 /// What a fit with one more effect brought.
 #[derive(Clone)]
@@ -108,6 +111,10 @@ pub(super) struct SearchState<'a> {
     pub last: Vec<Rejected>,
     /// What was taken and did not pass the last examination.
     pub refused: Vec<Rejected>,
+    /// Names of the effects beside which the balance of forces was asked last.
+    pub balanced_beside: Option<Vec<&'static str>>,
+    /// Whether the output integrates the input, once that was asked.
+    integrates: OnceLock<bool>,
 }
 
 impl<'a> SearchState<'a> {
@@ -125,6 +132,8 @@ impl<'a> SearchState<'a> {
             wrong: Vec::new(),
             last: Vec::new(),
             refused: Vec::new(),
+            balanced_beside: None,
+            integrates: OnceLock::new(),
         }
     }
 
@@ -184,6 +193,15 @@ impl<'a> SearchState<'a> {
             }
         }
         Ok(sums)
+    }
+
+    /// Whether the output integrates the input.
+    pub(super) fn integrates(&self) -> Result<bool, Error> {
+        if let Some(known) = self.integrates.get() {
+            return Ok(*known);
+        }
+        let found = integrates(&self.prepared.record, &self.setup.policy.outside)?;
+        Ok(*self.integrates.get_or_init(|| found))
     }
 
     /// The training squares that noise alone would leave.

@@ -74,12 +74,22 @@ pub(super) fn trials(
 /// Fits the whole model with one more effect.
 pub(super) fn trial(
     state: &SearchState,
-    Ranked { entry, score, .. }: Ranked,
+    Ranked { entry, score, start: given, .. }: Ranked,
     progress: Progress,
 ) -> Result<Trial, Error> {
     let gain = score.gain;
-    let start = start(state, &state.point, score)?;
-    let (fitted, options) = fitted(state, start, entry, progress)?;
+    let given_start = given.is_some();
+    let start = match given {
+        Some(given) => given,
+        None => start(state, &state.point, score)?,
+    };
+    let (fitted, options) = if given_start {
+        let options =
+            FitOptions { steps: state.setup.policy.fits.far_steps, ..state.setup.options.clone() };
+        (state.fit(start, &options, entry.name, progress)?, options)
+    } else {
+        fitted(state, start, entry, progress)?
+    };
     let trial = measured(state, &state.point, entry, fitted, options, gain, progress)?;
     reached(progress, entry.name, (trial.cost / state.prepared.values()).sqrt())?;
     if entry.stage != Stage::Plays || trial.deviance <= trial.threshold {

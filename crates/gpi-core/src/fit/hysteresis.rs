@@ -117,6 +117,7 @@ pub fn fit_hysteresis(
     };
     let freedom = Freedom {
         weights: true,
+        offsets: true,
         derivatives: Derivatives { starts: true, ..Derivatives::default() },
         states: true,
         identity: false,

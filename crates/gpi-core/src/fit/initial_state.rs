@@ -36,6 +36,7 @@ pub fn residuals_from_fitted_start(
     let own = &prepared.settings.initial_state;
     let mut options = fit_options(&prepared, &RefineOptions::default(), own.steps);
     options.freedom.weights = false;
+    options.freedom.offsets = false;
     options.freedom.identity = false;
     options.freedom.dynamics = DynamicsFreedom::Nothing;
     let mut best: Option<Fitted> = None;

@@ -48,6 +48,7 @@ pub(crate) fn fit_options(
     FitOptions {
         freedom: Freedom {
             weights: true,
+            offsets: true,
             derivatives,
             states: is_unknown,
             identity: true,

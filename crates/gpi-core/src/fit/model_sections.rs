@@ -4,7 +4,7 @@
 //! s_l, the system `(A, [B E], [C; S], D)` has the loops as further inputs and outputs; its sections in parallel contain E
 //! and S in the new coordinates.
 
-use crate::effects::{ClosedLoops, Effect, InnerLoop, PlaceMut, Sees};
+use crate::effects::{ClosedLoops, Drives, Effect, InnerLoop, PlaceMut, Sees};
 use crate::linear::{Sections, StateSpace};
 use crate::{Error, Matrix, Model};
 
@@ -16,13 +16,15 @@ pub(crate) fn sections_of(model: &Model) -> Result<(Sections, Vec<Effect>), Erro
     if loops.is_empty() {
         return Ok((Sections::from_delayed_state_space(model.linear())?, effects));
     }
-    let (own, delay) = without_delay(model.linear());
+    let (own, delay) = model.linear().behind_dead_time();
     let (order, inputs, outputs) = (own.order(), own.inputs(), own.outputs());
     let mut e = Matrix::zeros(order, loops.len());
     let mut s = Matrix::zeros(loops.len(), order);
     for (number, inner) in loops.iter().enumerate() {
-        let first = order - inner.drives.len();
-        e.column_mut(number).rows_mut(first, inner.drives.len()).copy_from_slice(&inner.drives);
+        let first = order - inner.drives.states();
+        if let Drives::States(column) = &inner.drives {
+            e.column_mut(number).rows_mut(first, column.len()).copy_from_slice(column);
+        }
         if let Sees::Mixture { states, .. } = &inner.sees {
             let row = nalgebra::RowDVector::from_row_slice(states);
             s.row_mut(number).columns_mut(first, states.len()).copy_from(&row);
@@ -39,7 +41,11 @@ pub(crate) fn sections_of(model: &Model) -> Result<(Sections, Vec<Effect>), Erro
     for effect in &mut effects {
         let PlaceMut::Loops(closed) = effect.place_mut() else { continue };
         for inner in closed.loops_mut() {
-            inner.drives = e.column(number).iter().copied().collect();
+            // a force enters where the input does, in any coordinates
+            match &mut inner.drives {
+                Drives::States(column) => *column = e.column(number).iter().copied().collect(),
+                Drives::Input { states, .. } => *states = order,
+            }
             if let Sees::Mixture { states, .. } = &mut inner.sees {
                 *states = s.row(number).iter().copied().collect();
             }
@@ -47,36 +53,4 @@ pub(crate) fn sections_of(model: &Model) -> Result<(Sections, Vec<Effect>), Erro
         }
     }
     Ok((sections, effects))
-}
-
-/// A state space without the shift registers of its inputs, if it begins with them, and how many
-/// samples they take.
-fn without_delay(system: &StateSpace) -> (StateSpace, usize) {
-    let inputs = system.inputs();
-    for delay in (1..=system.order() / inputs).rev() {
-        let first = delay * inputs;
-        let states = system.order() - first;
-        let (a, b, c, d) = (system.a(), system.b(), system.c(), system.d());
-        let registers = StateSpace::delayed_gain(&Matrix::identity(inputs, inputs), delay);
-        let late = first - inputs;
-        let begins = a.view((0, 0), (first, first)) == *registers.a()
-            && a.view((0, first), (first, states)).amax() == 0.0
-            && a.view((first, 0), (states, late)).amax() == 0.0
-            && b.rows(0, first) == *registers.b()
-            && b.rows(first, states).amax() == 0.0
-            && c.columns(0, late).amax() == 0.0
-            && d.amax() == 0.0;
-        let own = begins.then(|| {
-            StateSpace::new(
-                a.view((first, first), (states, states)).into_owned(),
-                a.view((first, late), (states, inputs)).into_owned(),
-                c.columns(first, states).into_owned(),
-                c.columns(late, inputs).into_owned(),
-            )
-        });
-        if let Some(Ok(own)) = own {
-            return (own, delay);
-        }
-    }
-    (system.clone(), 0)
 }

@@ -11,7 +11,7 @@
 
 use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{Past, Point};
-use crate::effects::{PlaceMut, Sees};
+use crate::effects::{Drives, PlaceMut, Sees};
 use crate::fit::Grid;
 use crate::fit::hysteresis::forgets_at;
 use crate::fit::model_sections::sections_of;
@@ -246,6 +246,9 @@ pub(crate) fn rescale(point: &mut Point) {
         for inner in closed.loops_mut() {
             if let Sees::Mixture { inputs, .. } = &mut inner.sees {
                 inputs.iter_mut().zip(&gains).for_each(|(seen, gain)| *seen /= gain);
+            }
+            if let Drives::Input { input, force, .. } = &mut inner.drives {
+                *force *= gains[*input];
             }
         }
     }

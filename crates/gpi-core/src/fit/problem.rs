@@ -172,6 +172,7 @@ mod tests {
         point.pasts[1].state.iter_mut().enumerate().for_each(|(j, x)| *x = 0.1 * (j + 1) as f64);
         let freedom = Freedom {
             weights: true,
+            offsets: true,
             derivatives: Derivatives { thresholds: true, half_widths: true, starts: true },
             states: true,
             identity: true,

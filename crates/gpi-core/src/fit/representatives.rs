@@ -158,6 +158,7 @@ mod tests {
 
     const FREEDOM: Freedom = Freedom {
         weights: true,
+        offsets: true,
         derivatives: Derivatives { thresholds: false, half_widths: true, starts: false },
         states: false,
         identity: true,

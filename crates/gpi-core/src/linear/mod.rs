@@ -1,6 +1,7 @@
 //! The linear dynamics G: estimation of its impulse response, realization as a state space, simulation, and inversion.
 
 mod arrow;
+mod dead_time;
 mod decompose;
 mod dot;
 mod era;
@@ -28,5 +29,5 @@ pub(crate) use dot::dot;
 pub(crate) use era::Hankel;
 pub(crate) use fir::{excitation_limit, impulse_response};
 pub(crate) use least_squares::{NormalEquations, bounded};
-pub(crate) use section::{Section, advance, move_poles};
+pub(crate) use section::{LARGEST_POLE, Section, advance, move_poles};
 pub(crate) use sections::{Sections, resonates};

@@ -21,6 +21,9 @@ pub(crate) struct Section {
     pub c: Matrix,
     /// The output that fixes the states' scale.
     pub reference: usize,
+    /// Initial states are counted from those that an input leads to which has grown as z^k with this z: 1, the steady state, or more
+    /// where the section integrates.
+    pub at: f64,
 }
 
 /// Moves the state of a section in observer form on by one sample, with what drives each of its states.
@@ -33,13 +36,21 @@ pub(crate) fn advance(a: &[f64], state: &mut [f64], driven: impl Fn(usize) -> f6
     }
 }
 
+/// Distance from the unit circle inside which poles are kept: nearer ones have a memory of more than 10^7 samples.
+const MARGIN: f64 = 1e-7;
+
+/// The largest modulus of a pole.
+pub(crate) const LARGEST_POLE: f64 = 1.0 - MARGIN;
+
 /// Whether all poles of a denominator lie inside a circle slightly smaller than the unit circle.
 fn is_stable(a: &[f64]) -> bool {
-    /// Poles beyond have a memory of more than 10^7 samples.
-    const MARGIN: f64 = 1e-7;
     match a {
-        [a1, a2] => *a2 < 1.0 - MARGIN && 1.0 + a1 + a2 > MARGIN && 1.0 - a1 + a2 > MARGIN,
-        a => a[0].abs() < 1.0 - MARGIN,
+        // with the poles p and q: (1 - p) (1 - q) and the sum of both factors, and the same at -1
+        [a1, a2] => {
+            let keeps_off = |a1: f64| 1.0 + a1 + a2 > MARGIN * (2.0 + a1);
+            *a2 < 1.0 - MARGIN && keeps_off(*a1) && keeps_off(-a1)
+        }
+        a => a[0].abs() <= LARGEST_POLE,
     }
 }
 
@@ -71,7 +82,7 @@ impl Section {
         c[(0, 0)] = 1.0;
         let mut driven = Matrix::zeros(a.len(), inputs);
         driven.column_mut(input).copy_from_slice(&b);
-        Self { a, b: driven, c, reference: 0 }
+        Self { a, b: driven, c, reference: 0, at: 1.0 }
     }
 
     pub(crate) fn order(&self) -> usize {
@@ -87,16 +98,25 @@ impl Section {
     }
 
     /// The state that a constant drive of each unknown (order, n) leads to: `(I - A)^-1 drive`.
+    pub(crate) fn steady(&self, drive: &Matrix) -> Matrix {
+        self.growing(drive, 1.0)
+    }
+
+    /// The state from which initial states are counted, `(z I - A)^-1 drive` at [`Section::at`].
     pub(crate) fn standing(&self, drive: &Matrix) -> Matrix {
+        self.growing(drive, self.at)
+    }
+
+    fn growing(&self, drive: &Matrix, z: f64) -> Matrix {
         let mut states = drive.clone();
         match self.a[..] {
             [a1, a2] => {
                 for mut column in states.column_iter_mut() {
-                    let x1 = (column[0] + column[1]) / (1.0 + a1 + a2);
-                    (column[0], column[1]) = (x1, column[1] - a2 * x1);
+                    let x1 = (z * column[0] + column[1]) / (z * z + a1 * z + a2);
+                    (column[0], column[1]) = (x1, (column[1] - a2 * x1) / z);
                 }
             }
-            _ => states /= 1.0 + self.a[0],
+            _ => states /= z + self.a[0],
         }
         states
     }
@@ -122,7 +142,7 @@ impl Section {
             Matrix::from_row_slice(1, b.len(), b.as_slice()),
             Matrix::from_column_slice(c.len(), 1, c.as_slice()),
         );
-        Self { a: vec![-p], b, c, reference: self.reference }
+        Self { a: vec![-p], b, c, ..*self }
     }
 
     pub(crate) fn is_stable(&self) -> bool {
@@ -154,7 +174,7 @@ impl Section {
         if let [pole] = *poles {
             let scale = seen[(reference, 0)];
             let c = real(seen.map(|value| value / scale));
-            return Self { a: vec![-pole.re], b: real(driven * scale), c, reference };
+            return Self { a: vec![-pole.re], b: real(driven * scale), c, reference, at: 1.0 };
         }
         let (first, second) = (poles[0], poles[1]);
         let a = vec![-(first + second).re, (first * second).re];
@@ -172,7 +192,7 @@ impl Section {
             c = real(c_transposed.transpose());
         }
         c.set_row(reference, &nalgebra::RowDVector::from_vec(vec![1.0, 0.0]));
-        Self { a, b, c, reference }
+        Self { a, b, c, reference, at: 1.0 }
     }
 }
 
@@ -188,6 +208,7 @@ mod tests {
             b: Matrix::from_row_slice(2, 1, &[0.3, -0.2]),
             c: Matrix::from_row_slice(2, 2, &[1.0, 0.0, 0.7, 0.5]),
             reference: 0,
+            at: 1.0,
         };
         let parts = [whole.part(p), whole.part(q)];
         let impulse = |section: &Section| {

@@ -8,15 +8,16 @@ use nalgebra::DVector;
 use num_complex::Complex64;
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// `G(z) = z^-delay (D + sum of sections)`, each column of G held to a DC gain by D.
+/// `G(z) = z^-delay (D + sum of sections)`. Each column of G is held to a DC gain by D, so that the scale of v is that of the hysteresis, or
+/// D is held and the hysteresis has a scale of its own: G integrates then, or passes nothing of v at once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Sections {
     pub delay: usize,
     pub sections: Vec<Section>,
     /// (outputs, inputs).
     pub d: Matrix,
-    /// For each input: the output at which the DC gain is held, and that gain.
-    pub held: Vec<(usize, f64)>,
+    /// For each input: the output at which the DC gain is held, and that gain; `None` where D is held.
+    pub held: Vec<Option<(usize, f64)>>,
 }
 
 type ComplexMatrix = nalgebra::DMatrix<Complex64>;
@@ -24,7 +25,7 @@ type ComplexMatrix = nalgebra::DMatrix<Complex64>;
 impl Sections {
     /// A gain (outputs, inputs) after a delay in samples.
     pub(crate) fn delayed_gain(gain: &Matrix, delay: usize) -> Self {
-        let held = vec![(0, 0.0); gain.ncols()];
+        let held = vec![Some((0, 0.0)); gain.ncols()];
         Self { delay, sections: Vec::new(), d: gain.clone(), held }.holding_present_gain()
     }
 
@@ -36,14 +37,14 @@ impl Sections {
         for output in 0..outputs {
             let c = Matrix::from_fn(outputs, 1, |row, _| f64::from(u8::from(row == output)));
             let b = (1.0 - pole) * lagged.d.rows(output, 1);
-            lagged.sections.push(Section { a: vec![-pole], b, c, reference: output });
+            lagged.sections.push(Section { a: vec![-pole], b, c, reference: output, at: 1.0 });
         }
         lagged
     }
 
     /// The sections of a state space, after `delay` samples that it does not contain.
     pub(crate) fn from_state_space(system: &StateSpace, delay: usize) -> Result<Self, Error> {
-        let held = vec![(0, 0.0); system.inputs()];
+        let held = vec![Some((0, 0.0)); system.inputs()];
         let sections = sections_of(system, system.outputs())?;
         Ok(Self { delay, sections, d: system.d().clone(), held }.holding_present_gain())
     }
@@ -70,7 +71,7 @@ impl Sections {
             first += order;
         }
         let d = system.d().view((0, 0), (outputs, inputs)).into_owned();
-        let held = vec![(0, 0.0); inputs];
+        let held = vec![Some((0, 0.0)); inputs];
         Ok((Self { delay, sections, d, held }.holding_present_gain(), e, s))
     }
 
@@ -127,7 +128,7 @@ impl Sections {
 
     /// G(1), (outputs, inputs).
     pub(crate) fn dc_gain(&self) -> Matrix {
-        self.sections.iter().fold(self.d.clone(), |sum, s| sum + &s.c * s.standing(&s.b))
+        self.sections.iter().fold(self.d.clone(), |sum, s| sum + &s.c * s.steady(&s.b))
     }
 
     /// `C (I - A)^-1 E`, (outputs): the outputs in steady state where E is added to each next state.
@@ -137,7 +138,7 @@ impl Sections {
         for section in &self.sections {
             let (own, others) = rest.split_at(section.order());
             let drive = Matrix::from_column_slice(own.len(), 1, own);
-            sum += (&section.c * section.standing(&drive)).column(0);
+            sum += (&section.c * section.steady(&drive)).column(0);
             rest = others;
         }
         sum
@@ -147,6 +148,11 @@ impl Sections {
     pub(crate) fn with_poles(&self, is_wanted: impl Fn(&Complex64) -> bool) -> Self {
         let wanted = self.sections.iter().filter_map(|section| section.with_poles(&is_wanted));
         Self { sections: wanted.collect(), ..self.clone() }.holding_present_gain()
+    }
+
+    /// The column of B of an input.
+    pub(crate) fn driven_by(&self, input: usize) -> impl Iterator<Item = f64> {
+        self.sections.iter().flat_map(move |section| section.b.column(input).into_iter().copied())
     }
 
     /// C, (outputs, order).
@@ -181,25 +187,24 @@ impl Sections {
         sum * Complex64::from_polar(1.0, -frequency * self.delay as f64)
     }
 
-    /// Holds the largest DC gain of every column at its present value.
+    /// Holds the largest DC gain of every column at its present value, where one is held.
     pub(crate) fn holding_present_gain(mut self) -> Self {
         let dc = self.dc_gain();
-        self.held = (0..self.inputs())
-            .map(|input| {
-                let output = dc.column(input).map(f64::abs).imax();
-                (output, dc[(output, input)])
-            })
-            .collect();
+        for (input, held) in self.held.iter_mut().enumerate() {
+            let output = dc.column(input).map(f64::abs).imax();
+            *held = held.map(|_| (output, dc[(output, input)]));
+        }
         self
     }
 
-    /// Gives every column of G a largest DC gain of plus or minus one; returns what was divided by.
+    /// Gives every column of G whose DC gain is held a largest one of plus or minus one; returns what was divided by.
     pub(crate) fn normalize_gain(&mut self) -> Vec<f64> {
         let dc = self.dc_gain();
         let mut gains = Vec::new();
         for input in 0..self.inputs() {
             let gain = dc.column(input).amax();
-            let gain = if gain > 0.0 && gain.is_finite() { gain } else { 1.0 };
+            let is_held = self.held[input].is_some();
+            let gain = if is_held && gain > 0.0 && gain.is_finite() { gain } else { 1.0 };
             self.d.column_mut(input).unscale_mut(gain);
             for section in &mut self.sections {
                 section.b.column_mut(input).unscale_mut(gain);
@@ -213,8 +218,10 @@ impl Sections {
     /// Makes D what the held DC gains ask for.
     pub(crate) fn hold_gain(&mut self) {
         let dc = self.dc_gain();
-        for (input, &(output, gain)) in self.held.iter().enumerate() {
-            self.d[(output, input)] += gain - dc[(output, input)];
+        for (input, held) in self.held.iter().enumerate() {
+            if let &Some((output, gain)) = held {
+                self.d[(output, input)] += gain - dc[(output, input)];
+            }
         }
     }
 
@@ -301,7 +308,7 @@ mod tests {
         let driven = ComplexMatrix::from_element(count, 1, Complex64::new(0.3, 0.0));
         let d = Matrix::from_element(1, 1, 0.2);
         let sections = vec![Section::from_poles(poles, &seen, &driven, 1)];
-        Sections { delay: 0, sections, d, held: vec![(0, 0.0)] }.holding_present_gain()
+        Sections { delay: 0, sections, d, held: vec![Some((0, 0.0))] }.holding_present_gain()
     }
 
     #[test]

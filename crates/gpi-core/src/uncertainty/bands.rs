@@ -70,8 +70,7 @@ impl Bands {
     pub(crate) fn effect_deviations(&self) -> Result<Vec<Vec<f64>>, Error> {
         let units = Units { input: "", output: "" };
         let quantities = |point: &Point| -> Vec<Vec<f64>> {
-            let gains = |drives: &[f64]| Some(point.dynamics.gains_from_states(drives));
-            let force = |inner: &InnerLoop| inner.relative_force(gains);
+            let force = |inner: &InnerLoop| point.steady_force(inner);
             let of = |effect: &Effect| {
                 effect.quantities(units, &force).iter().map(|q| q.value).collect()
             };

@@ -64,7 +64,7 @@ static real slew(real *drive, real input, real reach)
 }
 
 @end
-@bent|bouc_wen
+@bent|bouc_wen|dahl
 /* log(1 + x) for x >= 0 */
 static real log_of_one_plus(real x)
 {
@@ -286,6 +286,47 @@ static real bouc_wen(real *memory, real z, real beta, real gamma, real exponent)
     memory[2] = before;
     memory[1] = z;
     return memory[0];
+}
+
+@end
+@dahl
+/* The friction f behind a change of z in one direction, df = (dz - |dz| f) / distance, and its mean over the change. */
+static real slid(real f, real dz, real distance, real *mean)
+{
+    const real sign = dz < 0 ? -1 : 1;
+    const real x = dz * sign / distance;
+    const real lost = -exp_less_one(-x);
+    const real part = x > (real)1e-4 ? lost / x : 1 - x * ((real)0.5 - x / 6);
+    *mean = sign + (f - sign) * part;
+    return f + (sign - f) * lost;
+}
+
+/* Friction at a sample: z turns back where the parabola through its last three samples does. */
+static real dahl(real *memory, real z, real distance, int averaged)
+{
+    const real before = memory[1], last = memory[0];
+    const real slope = (3 * z - 4 * before + memory[2]) / 2, curvature = z - 2 * before + memory[2];
+    real mean, rest;
+    if (slope * curvature > 0 && slope * slope < curvature * curvature) {
+        const real turn = z - slope * slope / curvature / 2;
+        memory[0] = slid(last, turn - before, distance, &mean);
+        memory[0] = slid(memory[0], z - turn, distance, &rest);
+        mean += (rest - mean) * slope / curvature;
+    } else {
+        memory[0] = slid(last, z - before, distance, &mean);
+    }
+    memory[2] = before;
+    memory[1] = z;
+    return averaged ? mean + memory[0] - last : memory[0];
+}
+
+@end
+@speed
+static real speed(real *memory, real z)
+{
+    const real change = z - *memory;
+    *memory = z;
+    return change < 0 ? -change : change;
 }
 
 @end

@@ -48,7 +48,7 @@ fn slew(drive: &mut [Real], input: Real, reach: Real) -> Real {
     drive[0]
 }
 @end
-@bent|bouc_wen
+@bent|bouc_wen|dahl
 
 /// log(1 + x) for x >= 0
 fn log_of_one_plus(x: Real) -> Real {
@@ -241,6 +241,42 @@ fn bouc_wen(memory: &mut [Real], z: Real, beta: Real, gamma: Real, exponent: Rea
     memory[2] = before;
     memory[1] = z;
     memory[0]
+}
+@end
+@dahl
+
+/// The friction f behind a change of z in one direction, df = (dz - |dz| f) / distance, and its mean over the change.
+fn slid(f: Real, dz: Real, distance: Real) -> (Real, Real) {
+    let sign = if dz < 0.0 { -1.0 } else { 1.0 };
+    let x = dz * sign / distance;
+    let lost = -exp_less_one(-x);
+    let part = if x > 1e-4 { lost / x } else { 1.0 - x * (0.5 - x / 6.0) };
+    (f + (sign - f) * lost, sign + (f - sign) * part)
+}
+
+/// Friction at a sample: z turns back where the parabola through its last three samples does.
+fn dahl(memory: &mut [Real], z: Real, distance: Real, averaged: u8) -> Real {
+    let (last, before, older) = (memory[0], memory[1], memory[2]);
+    let slope = (3.0 * z - 4.0 * before + older) / 2.0;
+    let curvature = z - 2.0 * before + older;
+    let (f, mean) = if slope * curvature > 0.0 && slope * slope < curvature * curvature {
+        let turn = z - slope * slope / curvature / 2.0;
+        let (turned, mean) = slid(last, turn - before, distance);
+        let (f, rest) = slid(turned, z - turn, distance);
+        (f, mean + (rest - mean) * slope / curvature)
+    } else {
+        slid(last, z - before, distance)
+    };
+    memory.copy_from_slice(&[f, z, before]);
+    if averaged > 0 { mean + f - last } else { f }
+}
+@end
+@speed
+
+fn speed(memory: &mut [Real], z: Real) -> Real {
+    let change = z - memory[0];
+    memory[0] = z;
+    change.abs()
 }
 @end
 @mixture

@@ -224,9 +224,42 @@ function [force, places] = law(own, signal, places)
             force = changed(own, places(1), turn - before);
             force = changed(own, force, signal - turn);
             places = [force; signal; before];
+        case 'dahl'
+            [last, before] = deal(places(1), places(2));
+            slope = (3 * signal - 4 * before + places(3)) / 2;
+            curvature = signal - 2 * before + places(3);
+            if slope * curvature > 0 && slope ^ 2 < curvature ^ 2
+                turn = signal - slope ^ 2 / curvature / 2;
+                [turned, average] = slid(own, last, turn - before);
+                [friction, rest] = slid(own, turned, signal - turn);
+                average = average + (rest - average) * slope / curvature;
+            else
+                [friction, average] = slid(own, last, signal - before);
+            end
+            force = friction;
+            if own.averaged > 0
+                force = average + friction - last;
+            end
+            places = [friction; signal; before];
+        case 'speed'
+            force = abs(signal - places);
+            places = signal;
         otherwise
             unknown(own);
     end
+end
+
+function [f, average] = slid(own, f, dz)
+    % friction behind a change of z in one direction, df = (dz - |dz| f) / distance, and its mean over the change
+    direction = 1 - 2 * (dz < 0);
+    x = abs(dz) / own.distance;
+    lost = -expm1(-x);
+    part = 1 - x * (0.5 - x / 6);
+    if x > 1e-4
+        part = lost / x;
+    end
+    average = direction + (f - direction) * part;
+    f = f + (direction - f) * lost;
 end
 
 function w = changed(own, w, dz)

@@ -4,6 +4,7 @@ use crate::effects::block::Block;
 use crate::effects::inner_loop::InnerLoop;
 use crate::effects::loop_values;
 use crate::effects::quantity::{Quantity, Units};
+use crate::effects::steady_force::SteadyForce;
 
 /// The coefficients `a1, ..` and `b1, ..` of `(b1 q^-1 + ..) / (1 + a1 q^-1 + ..)`.
 pub type Coefficients = (Vec<f64>, Vec<f64>);
@@ -39,13 +40,12 @@ pub trait ClosedLoops: Block {
     /// The same, to be changed.
     fn loops_mut(&mut self) -> &mut [InnerLoop];
 
-    /// What the loops do in steady state, as an engineer reads it, where `relative_force` of a loop is known: the force of w =
-    /// 1 on the displacement over that of v which moves it by one unit, positive where it opposes the displacement.
+    /// What the loops do in steady state, as an engineer reads it, where the force of a loop is known.
     fn in_steady_state(
         &self,
         units: Units,
-        relative_force: &dyn Fn(&InnerLoop) -> Option<f64>,
+        forces: &dyn Fn(&InnerLoop) -> Option<SteadyForce>,
     ) -> Vec<Quantity> {
-        loop_values::in_steady_state(self.loops(), units, relative_force)
+        loop_values::in_steady_state(self.loops(), units, forces)
     }
 }

@@ -14,7 +14,8 @@
 //!   hysteresis does;
 //! - a limit of the input's speed that the input exceeds a few times only, because such a limit explains any error of the
 //!   response to a jump, whatever its cause;
-//! - a loop around dynamics whose output integrates the input, because it makes up for the integrator that G lacks;
+//! - a loop around dynamics whose output integrates the input, because it makes up for the integrator that G lacks, unless it leaves no more
+//!   than a part of the squares of the balance of forces ([`crate::explain::force_balance`]);
 //! - a hysteretic force in such a loop that leaves more than a part of the squares of the best model without it, because it
 //!   resembles a hysteresis before the dynamics.
 //!
@@ -24,8 +25,8 @@
 use super::contribution::contribution;
 use crate::chain::point::Point;
 use crate::effects::{FreeOrder, Place, Signature};
+use crate::explain::force_balance::balance;
 use crate::explain::judgement::Refusal;
-use crate::explain::outside::integrates;
 use crate::explain::state::SearchState;
 use crate::{Error, Experiment, Progress, Record};
 
@@ -62,9 +63,11 @@ pub(super) fn doubt(
     } else if matches!(of, Place::Widths(_) | Place::Output(_)) {
         Ok(Some(Refusal::ResemblesMisfit))
     } else if let Place::Loops(own) = of {
-        let (record, outside) = (&state.prepared.record, &state.setup.policy.outside);
-        if integrates(record, outside)? {
-            Ok(Some(Refusal::Integrates))
+        if state.integrates()? {
+            let (record, balanced) = (&state.prepared.record, &state.setup.policy.balance);
+            let found = balance(record, point.dynamics.delay, own.loops(), balanced);
+            let is_explained = found.is_some_and(|own| 1.0 - own.explained <= policy.left);
+            Ok((!is_explained).then_some(Refusal::Integrates))
         } else {
             let is_weak = own.loops().iter().any(|inner| inner.law.is_dissipative())
                 && state.cost > policy.left * state.best_without(place, progress)?.1;

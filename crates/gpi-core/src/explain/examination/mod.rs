@@ -61,7 +61,7 @@ pub(super) fn examine(
         fitted(state, trial.point.without_effect(place), trial.entry, progress)
     })?;
     let cost = without.linearization.cost;
-    let refusal = if let Some(refusal) = impossible(&trial.point, place) {
+    let refusal = if let Some(refusal) = impossible(state, &trial.point, place)? {
         Some(refusal)
     } else if !is_mode(state, trial)? {
         Some(Refusal::NotAMode)
@@ -89,7 +89,7 @@ pub(super) fn doubt(
     progress: Progress,
 ) -> Result<Option<Refusal>, Error> {
     let point = &state.point;
-    if let Some(refusal) = impossible(point, place) {
+    if let Some(refusal) = impossible(state, point, place)? {
         return Ok(Some(refusal));
     }
     if matches!(point.effects[place].place(), Place::Loops(_)) && is_saturated(state)? {
@@ -143,23 +143,26 @@ fn is_mode(state: &SearchState, trial: &Trial) -> Result<bool, Error> {
 }
 
 /// Why no machine can have the effect at a place, if so.
-fn impossible(point: &Point, place: usize) -> Option<Refusal> {
+fn impossible(state: &SearchState, point: &Point, place: usize) -> Result<Option<Refusal>, Error> {
     let effect = &point.effects[place];
     if let Place::Loops(closed) = effect.place() {
-        if !point.dynamics.has_resonance() {
-            return Some(Refusal::NoResonance);
+        // a mass without a spring shows what acts on it by integrating
+        let dissipates = closed.loops().iter().any(|inner| inner.law.is_dissipative());
+        let shows = point.dynamics.has_resonance() || (dissipates && state.integrates()?);
+        if !shows {
+            return Ok(Some(Refusal::NoResonance));
         }
         if closed.loops().iter().any(|inner| adds_energy(point, inner)) {
-            return Some(Refusal::Impossible);
+            return Ok(Some(Refusal::Impossible));
         }
     }
-    (!effect.block().is_none_or(Block::is_possible)).then_some(Refusal::Impossible)
+    Ok((!effect.block().is_none_or(Block::is_possible)).then_some(Refusal::Impossible))
 }
 
 /// Whether a loop is a force with beta > 0 that follows the displacement instead of opposing it: each cycle would add energy.
 fn adds_energy(point: &Point, inner: &InnerLoop) -> bool {
-    let gains = |drives: &[f64]| Some(point.dynamics.gains_from_states(drives));
-    inner.law.is_dissipative() && inner.relative_force(gains).is_some_and(|force| force <= 0.0)
+    let force = point.steady_force(inner);
+    inner.law.is_dissipative() && force.is_some_and(|force| force.over_stiffness <= 0.0)
 }
 
 /// Where the newest effect of a name stands.
