@@ -146,7 +146,9 @@ impl Model {
                 }
             }
             for inner in place.closed_loops().map_or(&[][..], ClosedLoops::loops) {
-                if let Some(flaw) = inner.flaw(self.linear().order(), inputs, outputs) {
+                let behind = self.linear().behind_dead_time().0.order();
+                let states = (self.linear().order(), behind);
+                if let Some(flaw) = inner.flaw(states, inputs, outputs) {
                     return Err(requirement(flaw));
                 }
             }

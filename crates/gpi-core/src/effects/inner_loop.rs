@@ -45,9 +45,7 @@ impl Drives {
     pub(crate) fn column(&self, b: &[Vec<f64>]) -> Vec<f64> {
         match self {
             Self::States(column) => column.clone(),
-            Self::Input { input, force, states } => {
-                b[*input][..*states].iter().map(|b| -force * b).collect()
-            }
+            Self::Input { input, force, .. } => b[*input].iter().map(|b| -force * b).collect(),
         }
     }
 }
@@ -190,13 +188,22 @@ impl InnerLoop {
         gains(&self.drives.column(b)).map(|gains| -gains[output]).filter(|force| force.is_finite())
     }
 
-    /// Why it is invalid around a G of so many states, inputs and outputs; `None` where it is valid.
-    pub(crate) fn flaw(&self, states: usize, inputs: usize, outputs: usize) -> Option<String> {
+    /// Why it is invalid around a G of so many states, so many of them behind the dead time, inputs and outputs; `None` where it
+    /// is valid.
+    pub(crate) fn flaw(
+        &self,
+        (states, behind): (usize, usize),
+        inputs: usize,
+        outputs: usize,
+    ) -> Option<String> {
         let drives = self.drives.states();
         if let Drives::Input { input, .. } = self.drives
             && input >= inputs
         {
             return Some(format!("drives input {input} of {inputs}"));
+        }
+        if matches!(self.drives, Drives::Input { .. }) && drives != behind {
+            return Some(format!("drives {drives} states, but {behind} are behind the dead time"));
         }
         if drives > states {
             return Some(format!("drives {drives} states, but the dynamics have {states}"));

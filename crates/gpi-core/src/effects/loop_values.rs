@@ -236,7 +236,7 @@ pub(super) fn in_steady_state(
     if let Some([mass, damping, stiffness]) = rubbing.and_then(|force| force.mechanics) {
         found.push(Quantity::new("mass", per_derivative(units, " s^2"), mass));
         found.push(Quantity::strength("damping", per_derivative(units, " s"), damping));
-        found.push(Quantity::strength("stiffness", per_derivative(units, ""), stiffness));
+        found.push(Quantity::strength("spring_rate", per_derivative(units, ""), stiffness));
     }
     found
 }

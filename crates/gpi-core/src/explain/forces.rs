@@ -16,9 +16,14 @@ use crate::linear::Sections;
 use crate::progress::Progress;
 use crate::{Error, Experiment, Matrix};
 
-/// The best force of each effect that acts inside the mechanics, with the model to begin at, where the model is far from the noise and
-/// has no such force yet. The balance depends on the record alone, so that it is asked once beside the same other effects.
-pub(super) fn forces(state: &mut SearchState, progress: Progress) -> Result<Vec<Ranked>, Error> {
+/// The best force of each effect that acts inside the mechanics, with the model to begin at. None where the model has such a force, or the
+/// part of the squares that another effect promises brings it near the noise. The balance depends on the record alone, so that it is
+/// asked once beside the same other effects.
+pub(super) fn forces(
+    state: &mut SearchState,
+    promised: f64,
+    progress: Progress,
+) -> Result<Vec<Ranked>, Error> {
     let beside: Vec<&'static str> = state.point.effects.iter().map(Effect::name).collect();
     if state.balanced_beside.as_ref() == Some(&beside) {
         return Ok(Vec::new());
@@ -29,7 +34,8 @@ pub(super) fn forces(state: &mut SearchState, progress: Progress) -> Result<Vec<
     let moving = &state.setup.moving;
     let is_single = record.outputs().len() == 1 && record.inputs().len() == 1;
     let is_free = moving.half_widths && moving.thresholds && !state.setup.order_is_given;
-    let is_near = state.cost <= policy.judgement.near_noise * state.noise_squares()?;
+    let left = (1.0 - promised) * state.cost;
+    let is_near = left <= policy.judgement.near_noise * state.noise_squares()?;
     if !is_single || !is_free || is_near || state.point.loops().next().is_some() {
         return Ok(Vec::new());
     }

@@ -82,12 +82,14 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
         best = ranked(state, progress)?;
     }
     let hopeless = policy.hopeless * state.setup.policy.judgement.least;
-    if best.iter().all(|one| one.score.gain < hopeless) {
+    let most = best.iter().map(|one| one.score.gain).fold(0.0, f64::max);
+    let forces = forces(state, most, progress)?;
+    if forces.is_empty() && most < hopeless {
         state.last.clear();
         return Ok(false);
     }
-    best.truncate(policy.fitted);
-    best.extend(forces(state, progress)?);
+    best.truncate(state.setup.policy.ranking.fitted);
+    best.extend(forces);
     let (mut trials, mut failed) = (Vec::new(), Vec::new());
     for tried in trials_of(state, best, progress)? {
         tried.map_or_else(|one| failed.push(one), |trial| trials.push(trial));
