@@ -172,11 +172,13 @@ def test_the_physics_of_the_public_benchmark_are_found() -> None:
     assert hysteresis["plays"]["half_widths"] == hysteresis["envelope"]["thresholds"] == [0.0]
 
 
-@pytest.mark.parametrize("stage", ["bouc-wen-spring", "dahl"])
-def test_forces_of_other_textbooks_are_named(stage: str) -> None:
+@pytest.mark.parametrize(
+    ("stage", "effect"), [("bouc-wen-spring", "hysteretic-stiffness"), ("dahl", "friction")]
+)
+def test_forces_of_other_textbooks_are_named(stage: str, effect: str) -> None:
     record = textbook.draw(stage, 1002)
     found = gpi.explain(gpi.Record(record.u, record.y, rate=record.rate))
-    assert found.effects == ["hysteretic-stiffness"]
+    assert found.effects == [effect]
     assert found.after["holdout"]["rms"] < 0.05 * found.before["holdout"]["rms"]
 
 
@@ -185,4 +187,4 @@ def test_forces_of_other_textbooks_are_named(stage: str) -> None:
 def test_no_force_stands_for_a_limit_or_for_hysteresis_before_the_dynamics(stage: str, seed: int) -> None:
     record = textbook.draw(stage, seed)
     found = gpi.explain(gpi.Record(record.u, record.y, rate=record.rate))
-    assert not {"stiffness", "hysteretic-stiffness"} & set(found.effects)
+    assert not {"stiffness", "hysteretic-stiffness", "friction"} & set(found.effects)

@@ -45,7 +45,10 @@ impl Drives {
     pub(crate) fn column(&self, b: &[Vec<f64>]) -> Vec<f64> {
         match self {
             Self::States(column) => column.clone(),
-            Self::Input { input, force, .. } => b[*input].iter().map(|b| -force * b).collect(),
+            // sections in parallel with G come behind its states
+            Self::Input { input, force, states } => {
+                b[*input].iter().take(*states).map(|b| -force * b).collect()
+            }
         }
     }
 }
