@@ -170,12 +170,15 @@ def test_derivatives_are_those_of_the_oracle(
         )
         for e, (u, rows) in enumerate(zip(us, scored, strict=True)):
             first = len(u) - rows
-            difference = (above.simulate(u, e, first) - below.simulate(u, e, first)) / (2 * step)
-            difference = difference[first:].T
+            here = described.simulate(u, e, first)
+            up, down = above.simulate(u, e, first) - here, here - below.simulate(u, e, first)
+            difference = ((up + down) / (2 * step))[first:].T
             derivative = jacobians[e][:, :, column]
             tolerance = 1e-5 * max(1.0, np.abs(difference).max())
-            # samples differ where a play turns within the step
-            assert np.mean(np.abs(derivative - difference) > tolerance) <= 0.01, (name, e)
+            # there is no derivative where a play turns within the step; it may keep its other place for long
+            bends = (np.abs(up - down) / (2 * step))[first:].T > tolerance
+            differs = (np.abs(derivative - difference) > tolerance) & ~bends
+            assert np.mean(differs) <= 0.01 and np.mean(bends) < 0.5, (name, e)
     stacked = np.concatenate([j.reshape(-1, len(names)) for j in jacobians])
     error = np.concatenate([e.T.ravel() for e in errors])
     scale = np.sqrt(np.sum(stacked**2, axis=0))
