@@ -242,7 +242,7 @@ CASES = {
 
 
 def test_every_effect_has_a_case():
-    # other columns, and a force that is integrated (test_hysteretic_stiffness.py)
+    # these have tests of their own
     assert set(CASES) | {"covariate", "hysteretic-stiffness", "friction"} == set(gpi.effect_names())
 
 

@@ -110,6 +110,10 @@ def test_impossible_values_are_refused() -> None:
     loop["drives"]["input"] = 2
     with pytest.raises((gpi.DataError, gpi.ParameterError), match=r"drives input 2 of 2"):
         with_loops(model_of(plant()), loop)
+    late = friction_loop()
+    late["drives"]["states"] += 1
+    with pytest.raises((gpi.DataError, gpi.ParameterError), match=r"are behind the dead time"):
+        with_loops(model_of(plant()), late, delay=2)
 
 
 @pytest.mark.slow

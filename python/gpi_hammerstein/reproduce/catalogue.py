@@ -164,7 +164,8 @@ BENCHMARKS: dict[str, Benchmark] = {
             folder="emps",
             title="EMPS: a motor-driven positioning stage, measured under feedback",
             truth="The stage integrates force to position, with viscous and Coulomb friction: 94.7 kg, "
-            "200 N s/m, 20.8 N.",
+            "200 N s/m and 20.8 N. With 35.15 N/V, these are mass = 2.69 V s^2/m, damping = 5.69 V s/m "
+            "and friction_force = 0.592 V.",
             effects=("friction",),
             unit="mm",
             factor=1e3,

@@ -159,7 +159,7 @@ impl Point {
             }
             // a pole that integrates stands at the unit circle; others are kept inside by their step
             Group::Denominator { section }
-                if values.len() == 1 && self.dynamics.sections[section].at > 1.0 =>
+                if values.len() == 1 && self.dynamics.sections[section].growth > 1.0 =>
             {
                 vec![(-LARGEST_POLE - values[0], LARGEST_POLE - values[0])]
             }

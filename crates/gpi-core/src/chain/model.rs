@@ -123,10 +123,10 @@ impl Model {
             own.map_or(String::new(), |channel| channel.unit.clone())
         };
         let (input, output) = (unit(self.inputs()), unit(self.outputs()));
-        let b = behind_dead_time(self.linear());
-        let poles = self.linear().behind_dead_time().0.poles().unwrap_or_default();
         let gains = |drives: &[f64]| self.linear().gains_from_states(drives);
         let force = |inner: &InnerLoop| {
+            let b = behind_dead_time(self.linear());
+            let poles = self.linear().behind_dead_time().0.poles().ok()?;
             let over_stiffness = inner.relative_force(&b, gains)?;
             let sensitivity = self.linear().dc_gain().ok()?[(0, 0)]
                 * Parameters::from_operator(&self.hysteresis()[0]).slope();

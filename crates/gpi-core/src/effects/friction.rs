@@ -40,7 +40,8 @@ impl Friction {
         {
             return Vec::new();
         }
-        // the parts of E differ where the input and the force are not sampled alike; a mass without a spring does not show it
+        // near a resonance, the force and the held input act on the states in different proportions; without one, the data do not
+        // determine the proportions, and those of the input are taken
         let drives = if situation.dynamics.has_resonance() {
             Drives::States(vec![0.0; order])
         } else {

@@ -124,7 +124,8 @@ fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
             bounds.push((1.0, SHARPEST));
         }
         if let Law::Dahl { distance, .. } = &inner.law {
-            /// The largest step of the logarithm of the break-away distance.
+            /// The largest step of the logarithm of the break-away distance. By hand: with longer steps it becomes shorter than the motion
+            /// within a sample before the other values have followed, and then it hardly changes the output.
             const STEP: f64 = 0.5;
             bounds.push((distance.ln() - STEP, distance.ln() + STEP));
         }
@@ -198,7 +199,7 @@ fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
 /// A power n of the displacement z adds `k_n z^n` to the linear force `k_1 z`; `kn_over_k1` is their ratio. The force of Bouc
 /// and Wen is `k_h w` with `w = z` for small motion; `hysteretic_over_linear` is `k_h / k_1`.
 ///
-/// Friction is printed in the unit of the input, of which it takes away so much, and beside it mass, damping and stiffness of the mechanics.
+/// Friction is printed as the part of the input that it takes away, together with the mass, damping and stiffness of the mechanics.
 pub(super) fn in_steady_state(
     loops: &[InnerLoop],
     units: Units,

@@ -286,7 +286,7 @@ mod tests {
         let record =
             Record::new(vec![run], 100.0, channel("u"), channel("y"), channel("x")).unwrap();
         let (b, c) = (Matrix::from_element(2, 1, 0.1), Matrix::from_row_slice(1, 2, &[1.0, 0.0]));
-        let mode = Section { a: vec![-1.2, 0.6], b, c, reference: 0, at: 1.0 };
+        let mode = Section { a: vec![-1.2, 0.6], b, c, reference: 0, growth: 1.0 };
         ask(&Situation {
             record: &record,
             drives: &signals,

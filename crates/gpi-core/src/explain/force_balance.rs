@@ -58,7 +58,7 @@ pub(super) fn balance(
     let mut filter = [2.0 * pace, pace * pace];
     let mut found = None;
     for _ in 0..policy.iterations {
-        let gram = sum_of(runs.iter().map(|run| gram(run, filter)))?;
+        let gram = runs.iter().map(|run| gram(run, filter)).reduce(|sum, next| sum + next)?;
         let with = solve(&gram, gram.ncols() - 1)?;
         let without = solve(&gram, UNFORCED)?;
         let [k, c, m] = [0, 1, 2].map(|i| with.unknowns[i]);
@@ -97,8 +97,8 @@ pub(super) fn squares(
 }
 
 impl Balance {
-    /// The linear mechanics behind an input of so much gain that is held between samples. They are counted from `at`.
-    pub(super) fn dynamics(&self, gain: f64, delay: usize, at: f64) -> Result<Sections, Error> {
+    /// The linear mechanics behind an input of so much gain that is held between samples; `growth` as in [`Section::growth`].
+    pub(super) fn dynamics(&self, gain: f64, delay: usize, growth: f64) -> Result<Sections, Error> {
         let [k, c, m] = self.mechanics;
         let continuous = TransferFunction::new(&[1.0 / (m * gain)], &[1.0, c / m, k / m])?;
         let system = zero_order_hold(&continuous.to_state_space()?, 1.0)?;
@@ -112,7 +112,7 @@ impl Balance {
             poles.iter().filter_map(|own| section.with_poles(|pole| pole == own)).collect()
         };
         let sections = sections.into_iter().flat_map(apart);
-        let sections = sections.map(|section| Section { at, ..section }).collect();
+        let sections = sections.map(|section| Section { growth, ..section }).collect();
         Ok(Sections { delay, sections, d: Matrix::zeros(1, 1), held: vec![None] })
     }
 }
@@ -125,7 +125,7 @@ const UNFORCED: usize = 4;
 
 /// The signals of each run of scored samples, (samples, 2 + laws).
 fn runs(record: &Record, delay: usize, laws: &[&Law]) -> Vec<Matrix> {
-    let of = |experiment: &Experiment| {
+    let of = |experiment: &Experiment| -> Vec<Matrix> {
         let signals = |run: std::ops::Range<usize>| {
             let (first, rows) = (run.start, run.len());
             let mut signals = Matrix::zeros(rows, 2 + laws.len());
@@ -144,11 +144,7 @@ fn runs(record: &Record, delay: usize, laws: &[&Law]) -> Vec<Matrix> {
         };
         experiment.scored_runs().filter(|run| run.len() > 2 * UNFORCED).map(signals).collect()
     };
-    record
-        .experiments()
-        .iter()
-        .flat_map(|experiment: &Experiment| -> Vec<Matrix> { of(experiment) })
-        .collect()
+    record.experiments().iter().flat_map(of).collect()
 }
 
 /// The root mean square change of y from sample to sample over its standard deviation.
@@ -215,10 +211,6 @@ impl Filter {
         }
         free
     }
-}
-
-fn sum_of(matrices: impl Iterator<Item = Matrix>) -> Option<Matrix> {
-    matrices.reduce(|sum, next| sum + next)
 }
 
 /// Products of all filtered columns of a run: y, y', y'', 1, the forces and, last, u.

@@ -5,12 +5,12 @@
 //! about its cause. The balance ([`super::force_balance`]) needs neither: mass, damping, stiffness and forces follow from it at once, and a fit
 //! begins there, without plays and deadzones.
 
-use super::force_balance::{balance, squares};
+use super::force_balance::{Balance, balance, squares};
 use super::ranking::Ranked;
 use super::score::Score;
 use super::state::{SearchState, Trial};
 use crate::chain::point::{DynamicsFreedom, Point};
-use crate::effects::{ClosedLoops, Drives, Effect, Entry, PlaceMut, Proposal, Situation, Stage};
+use crate::effects::{Drives, Effect, Entry, PlaceMut, Proposal, Situation, Stage};
 use crate::fit::preparation::rescale;
 use crate::linear::Sections;
 use crate::progress::Progress;
@@ -40,12 +40,25 @@ pub(super) fn forces(
         return Ok(Vec::new());
     }
     let straight = state.point.without_hysteresis(record);
+    let (delay, gain) = (straight.dynamics.delay, straight.channels[0].slope());
+    let growth = (policy.balance.slowest / record.scored() as f64).exp();
+    let dynamics = |own: &Balance| own.dynamics(gain, delay, growth).ok();
+    let linear = balance(record, delay, &[], &policy.balance).filter(|_| gain != 0.0);
+    let Some(linear) = linear.as_ref().and_then(dynamics) else { return Ok(Vec::new()) };
     let mut found = Vec::new();
     for &entry in state.setup.allowed.iter().filter(|entry| entry.stage == Stage::Dynamics) {
-        let is_refused = state.refused.iter().any(|rejected| rejected.effect == entry.name);
-        if !is_refused {
-            found.extend(best(state, &straight, entry, progress)?);
+        if state.refused.iter().any(|rejected| rejected.effect == entry.name) {
+            continue;
         }
+        let Some((own, mut effect)) = best(state, &linear, entry) else { continue };
+        let Some(dynamics) = dynamics(&own) else { continue };
+        let forces: Vec<f64> = own.forces.iter().map(|force| gain * force).collect();
+        set_forces(&mut effect, &forces, &dynamics);
+        let point = begin(state, &straight, dynamics, effect.clone());
+        let start = Some(settled(state, point, entry, progress)?);
+        let (columns, gain) = (forces.len(), own.explained);
+        let score = Score { start: effect, zero: None, gain, columns };
+        found.push(Ranked { entry, score, worth: gain, start });
     }
     found.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
     Ok(found)
@@ -77,62 +90,54 @@ pub(super) fn balanced(state: &SearchState, trial: &Trial) -> Result<Option<Bala
     }))
 }
 
-/// The block of an effect whose forces explain most, if that is enough.
-fn best(
-    state: &SearchState,
-    straight: &Point,
-    entry: &'static Entry,
-    progress: Progress,
-) -> Result<Option<Ranked>, Error> {
+/// The balance with the block of an effect whose forces explain most, if that is enough, and the block.
+fn best(state: &SearchState, linear: &Sections, entry: &Entry) -> Option<(Balance, Effect)> {
     let (record, policy) = (&state.prepared.record, &state.setup.policy.balance);
-    let delay = straight.dynamics.delay;
-    let at = (policy.slowest / record.scored() as f64).exp();
-    let gain = straight.channels[0].slope();
-    let linear = balance(record, delay, &[], policy).filter(|_| gain != 0.0);
-    let Some(dynamics) = linear.and_then(|own| own.dynamics(gain, delay, at).ok()) else {
-        return Ok(None);
+    let of = |proposal: Proposal<Effect>| {
+        let loops = proposal.block.place().closed_loops()?.loops();
+        Some((balance(record, linear.delay, loops, policy)?, proposal.block))
     };
-    let mut best: Option<(f64, Proposal<Effect>)> = None;
-    for proposal in proposals(state, &dynamics, entry) {
-        let Some(closed) = proposal.block.place().closed_loops() else { continue };
-        let Some(own) = balance(record, delay, closed.loops(), policy) else { continue };
-        if best.as_ref().is_none_or(|(most, _)| own.explained > *most) {
-            best = Some((own.explained, proposal));
+    let better = |known: (Balance, Effect), next: (Balance, Effect)| {
+        if next.0.explained > known.0.explained { next } else { known }
+    };
+    let found = proposals(state, linear, entry).into_iter().filter_map(of).reduce(better);
+    found.filter(|(own, _)| own.explained >= policy.least)
+}
+
+/// Gives the loops of an effect their forces, in the unit of v. They enter where the input does.
+fn set_forces(effect: &mut Effect, forces: &[f64], dynamics: &Sections) {
+    let PlaceMut::Loops(closed) = effect.place_mut() else { return };
+    for (inner, found) in closed.loops_mut().iter_mut().zip(forces) {
+        match &mut inner.drives {
+            Drives::States(column) => *column = dynamics.driven_by(0).map(|b| -found * b).collect(),
+            Drives::Input { force, .. } => *force = *found,
         }
     }
-    let Some((explained, proposal)) = best.filter(|(own, _)| *own >= policy.least) else {
-        return Ok(None);
-    };
-    let mut effect = proposal.block;
-    let loops = effect.place().closed_loops().map_or(&[][..], ClosedLoops::loops);
-    let Some(own) = balance(record, delay, loops, policy) else { return Ok(None) };
-    let Ok(dynamics) = own.dynamics(gain, delay, at) else { return Ok(None) };
-    let input: Vec<f64> = dynamics.driven_by(0).collect();
-    if let PlaceMut::Loops(closed) = effect.place_mut() {
-        for (inner, found) in closed.loops_mut().iter_mut().zip(&own.forces) {
-            // in the unit of v
-            let own = gain * found;
-            match &mut inner.drives {
-                Drives::States(column) => *column = input.iter().map(|b| -own * b).collect(),
-                Drives::Input { force, .. } => *force = own,
-            }
-        }
-    }
+}
+
+/// The present model with other dynamics and one more effect, and without plays and deadzones.
+fn begin(state: &SearchState, straight: &Point, dynamics: Sections, effect: Effect) -> Point {
     let mut point = state.prepared.point(dynamics);
     point.channels.clone_from(&straight.channels);
     state.prepared.settle(&mut point);
-    point = state.point.effects.iter().fold(point, |point, other| point.with_effect(other.clone()));
-    point = point.with_effect(effect.clone());
+    let effects = state.point.effects.iter().cloned().chain([effect]);
+    let mut point = effects.fold(point, |point, effect| point.with_effect(effect));
     rescale(&mut point);
+    point
+}
+
+/// A point with the offsets and initial states that fit best, all else held.
+fn settled(
+    state: &SearchState,
+    point: Point,
+    entry: &Entry,
+    progress: Progress,
+) -> Result<Point, Error> {
     let mut options = state.setup.options.clone();
     options.freedom.weights = false;
     options.freedom.identity = false;
     options.freedom.dynamics = DynamicsFreedom::Nothing;
-    let fitted = state.fit(point, &options, entry.name, progress)?;
-    let point = fitted.point;
-    let columns = own.forces.len();
-    let score = Score { start: effect, zero: None, gain: explained, columns };
-    Ok(Some(Ranked { entry, score, worth: explained, start: Some(point) }))
+    Ok(state.fit(point, &options, entry.name, progress)?.point)
 }
 
 /// The proposals of an effect for a mass of these dynamics that moves as measured.

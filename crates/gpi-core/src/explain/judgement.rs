@@ -124,7 +124,7 @@ pub(super) enum Refusal {
     ResemblesMisfit,
     /// It acts on too few occasions for a model that is far from the noise.
     TooRare,
-    /// It changes the dynamics of a stage that integrates, and the model is far from the noise.
+    /// It changes the dynamics of a stage that integrates, and leaves too much of the balance of forces.
     Integrates,
     /// It changes the dynamics of a stage whose output saturates.
     Saturates,
@@ -166,7 +166,7 @@ impl Refusal {
                 "acts a few times only in this record, and the error of the model would still be far above the noise".to_owned()
             }
             Self::Integrates => {
-                "would change the dynamics of a stage that integrates its input, and the error of the model would still be far above the noise".to_owned()
+                "would change the dynamics of a stage that integrates its input, and leaves too much of the balance of forces unexplained".to_owned()
             }
             Self::Saturates => {
                 "would change the dynamics of a stage whose output saturates, where the model errs most".to_owned()

@@ -4,6 +4,8 @@
 //!    time (`blocks`). G gets no poles that would follow creep or a disturbance.
 //! 2. Every candidate of the catalogue is ranked by a score test (`score`): the change of the output by the effect,
 //!    projected off the model's own sensitivities (`projection`), explains a part of the residual.
+//!    Of a record with one input and one output that is far from the noise, the balance of forces of a mass (`force_balance`) proposes forces
+//!    inside the mechanics as well, and the models at which their fits begin (`forces`).
 //! 3. The best few are fitted jointly with the whole model (`trial`). The one that explains most is accepted if it is
 //!    significant and the held-out blocks confirm it (`judgement`), and if what it does is its own
 //!    (`examination`). Effects that it makes superfluous are dropped (`revision`).
@@ -11,7 +13,7 @@
 //!    function of time that it explains as well, and the residual is tested for remaining structure (`residual`).
 //!
 //! The files import in one direction only: `policy` (every tolerance), `judgement`, `base`, `projection`,
-//! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `trial`,
+//! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `trial`,
 //! `examination`, `grid`, `revision`, `search`, `outside` (why the structure is wrong), `explanation`.
 
 pub(crate) mod base;

@@ -130,7 +130,8 @@ settings! {
     struct FitPolicy {
         /// Steps of a trial. A trial is only compared with other trials; what is found is refined at the end.
         steps: usize = 12, FROM_ONE;
-        /// Steps of a trial that begins far from the present model. By hand.
+        /// Steps of a trial that begins far from the present model. They are those of one fit, because a fit that is continued begins with
+        /// the first damping again. By hand.
         far_steps: usize = 60, FROM_ONE;
         /// Part of the squares below which a step of a trial is the last. By hand, far below any threshold.
         gain: f64 = 1e-5, PART;
@@ -157,15 +158,15 @@ settings! {
         /// The first poles of the filter, over the rms change of the output from sample to sample relative to its standard
         /// deviation: faster than the motion, so that all of it takes part. By hand.
         faster: f64 = 3.0, POSITIVE;
-        /// Iterations of the filter. By hand: the poles settle within three.
+        /// Iterations of the filter. By hand.
         iterations: usize = 5, FROM_ONE;
         /// Slowest pole of the filter in radians over the length of the record: four periods. What is slower cannot be told from
         /// the start.
         slowest: f64 = 25.0, POSITIVE;
         /// The same of the mechanics that a fit begins at: one that integrates has a pole at zero, which the fit finds from there.
         least_pole: f64 = 0.1, POSITIVE;
-        /// The part of the squares that forces must explain. In simulations of linear stages they explain up to 0.08, true ones from
-        /// 0.34.
+        /// The part of the squares that forces must explain. By hand: a fit that begins at a force which is not there costs time, but no
+        /// name.
         least: f64 = 0.15, PART;
     }
 

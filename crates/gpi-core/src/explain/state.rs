@@ -24,7 +24,6 @@ use crate::identify::NoiseFloor;
 use crate::progress::Progress;
 use crate::uncertainty::outliers;
 use crate::{Error, Record};
-
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 

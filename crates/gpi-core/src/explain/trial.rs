@@ -78,17 +78,13 @@ pub(super) fn trial(
     progress: Progress,
 ) -> Result<Trial, Error> {
     let gain = score.gain;
-    let given_start = given.is_some();
-    let start = match given {
-        Some(given) => given,
-        None => start(state, &state.point, score)?,
-    };
-    let (fitted, options) = if given_start {
-        let options =
-            FitOptions { steps: state.setup.policy.fits.far_steps, ..state.setup.options.clone() };
-        (state.fit(start, &options, entry.name, progress)?, options)
-    } else {
-        fitted(state, start, entry, progress)?
+    let (fitted, options) = match given {
+        Some(given) => {
+            let steps = state.setup.policy.fits.far_steps;
+            let options = FitOptions { steps, ..state.setup.options.clone() };
+            (state.fit(given, &options, entry.name, progress)?, options)
+        }
+        None => fitted(state, start(state, &state.point, score)?, entry, progress)?,
     };
     let trial = measured(state, &state.point, entry, fitted, options, gain, progress)?;
     reached(progress, entry.name, (trial.cost / state.prepared.values()).sqrt())?;

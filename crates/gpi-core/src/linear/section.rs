@@ -23,7 +23,7 @@ pub(crate) struct Section {
     pub reference: usize,
     /// Initial states are counted from those that an input leads to which has grown as z^k with this z: 1, the steady state, or more
     /// where the section integrates.
-    pub at: f64,
+    pub growth: f64,
 }
 
 /// Moves the state of a section in observer form on by one sample, with what drives each of its states.
@@ -82,7 +82,7 @@ impl Section {
         c[(0, 0)] = 1.0;
         let mut driven = Matrix::zeros(a.len(), inputs);
         driven.column_mut(input).copy_from_slice(&b);
-        Self { a, b: driven, c, reference: 0, at: 1.0 }
+        Self { a, b: driven, c, reference: 0, growth: 1.0 }
     }
 
     pub(crate) fn order(&self) -> usize {
@@ -102,9 +102,9 @@ impl Section {
         self.growing(drive, 1.0)
     }
 
-    /// The state from which initial states are counted, `(z I - A)^-1 drive` at [`Section::at`].
+    /// The state from which initial states are counted, `(z I - A)^-1 drive` at [`Section::growth`].
     pub(crate) fn standing(&self, drive: &Matrix) -> Matrix {
-        self.growing(drive, self.at)
+        self.growing(drive, self.growth)
     }
 
     fn growing(&self, drive: &Matrix, z: f64) -> Matrix {
@@ -174,7 +174,7 @@ impl Section {
         if let [pole] = *poles {
             let scale = seen[(reference, 0)];
             let c = real(seen.map(|value| value / scale));
-            return Self { a: vec![-pole.re], b: real(driven * scale), c, reference, at: 1.0 };
+            return Self { a: vec![-pole.re], b: real(driven * scale), c, reference, growth: 1.0 };
         }
         let (first, second) = (poles[0], poles[1]);
         let a = vec![-(first + second).re, (first * second).re];
@@ -192,7 +192,7 @@ impl Section {
             c = real(c_transposed.transpose());
         }
         c.set_row(reference, &nalgebra::RowDVector::from_vec(vec![1.0, 0.0]));
-        Self { a, b, c, reference, at: 1.0 }
+        Self { a, b, c, reference, growth: 1.0 }
     }
 }
 
@@ -208,7 +208,7 @@ mod tests {
             b: Matrix::from_row_slice(2, 1, &[0.3, -0.2]),
             c: Matrix::from_row_slice(2, 2, &[1.0, 0.0, 0.7, 0.5]),
             reference: 0,
-            at: 1.0,
+            growth: 1.0,
         };
         let parts = [whole.part(p), whole.part(q)];
         let impulse = |section: &Section| {

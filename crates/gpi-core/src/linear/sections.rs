@@ -37,7 +37,7 @@ impl Sections {
         for output in 0..outputs {
             let c = Matrix::from_fn(outputs, 1, |row, _| f64::from(u8::from(row == output)));
             let b = (1.0 - pole) * lagged.d.rows(output, 1);
-            lagged.sections.push(Section { a: vec![-pole], b, c, reference: output, at: 1.0 });
+            lagged.sections.push(Section { a: vec![-pole], b, c, reference: output, growth: 1.0 });
         }
         lagged
     }
