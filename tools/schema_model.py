@@ -246,5 +246,16 @@ MODEL = closed(
         "linear": closed({name: MATRIX for name in "abcd"}, said="x+ = A x + B v, y = C x + D v"),
         "offsets": numbers("of each output"),
     },
-    {"effects": listed(part("effect")), "estimates": ESTIMATES, "prediction": PREDICTION},
+    {
+        "effects": listed(part("effect")),
+        "intersample": closed(
+            {
+                "substeps": count("steps of the loops from one sample to the next"),
+                "hold": one_of("zero", "first"),
+            },
+            said="how loops are computed between samples, see (T13) of the theory",
+        ),
+        "estimates": ESTIMATES,
+        "prediction": PREDICTION,
+    },
 )

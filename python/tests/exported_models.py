@@ -166,11 +166,26 @@ def loops_of_two_axes() -> Case:
     return Case(model, two_axes.wander(1000))
 
 
+def loops_between_samples() -> Case:
+    """Loops that take three steps a sample and look ahead, behind a dead time."""
+    case = loops_of_two_axes()
+    return Case(changed(case.model, intersample={"substeps": 3, "hold": "first"}), case.u)
+
+
+def loops_beside_creep() -> Case:
+    """Loops of several effects that take two steps a sample, beside sections in parallel with G."""
+    names = "creep", "stiffness", "friction", "hysteretic-stiffness"
+    model = changed(with_effects(*names), intersample={"substeps": 2, "hold": "zero"})
+    return Case(model, wander(1000))
+
+
 CASES: dict[str, Callable[[], Case]] = {
     "every-effect": every_effect,
     "declared": declared,
     "late-dynamics": late_dynamics,
     "loops-of-two-axes": loops_of_two_axes,
+    "loops-between-samples": loops_between_samples,
+    "loops-beside-creep": loops_beside_creep,
 }
 
 

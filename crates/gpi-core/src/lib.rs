@@ -38,6 +38,8 @@ mod fit;
 #[cfg(feature = "identify")]
 pub mod identify;
 #[cfg(feature = "identify")]
+mod intersample;
+#[cfg(feature = "identify")]
 pub mod linear;
 #[cfg(feature = "identify")]
 mod model;
@@ -66,6 +68,8 @@ mod uncertainty;
 pub use error::{Error, ErrorKind};
 #[cfg(feature = "identify")]
 pub use estimates::{EffectEstimates, Estimate, EstimatedNoise, Estimates};
+#[cfg(feature = "identify")]
+pub use intersample::{Hold, Intersample, LoopStep};
 #[cfg(feature = "identify")]
 pub use model::{Hysteresis, Model, ModelState};
 #[cfg(feature = "identify")]

@@ -6,7 +6,7 @@ use crate::linear::StateSpace;
 use crate::operators::{Gpi, GpiState, Operator};
 use crate::simulation_error::SimulationError;
 use crate::uncertainty::Prediction;
-use crate::{Channel, Error, Matrix, Record};
+use crate::{Channel, Error, Intersample, Matrix, Record};
 use nalgebra::DVector;
 
 /// The hysteresis of one input: envelope and plays with parameters on the heap.
@@ -28,6 +28,8 @@ pub struct Model {
     offsets: Vec<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) effects: Vec<Effect>,
+    #[serde(default, skip_serializing_if = "Intersample::is_plain")]
+    pub(crate) intersample: Intersample,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) estimates: Option<Estimates>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -78,6 +80,7 @@ impl Model {
             linear,
             offsets,
             effects,
+            intersample: Intersample::default(),
             estimates,
             prediction,
         };

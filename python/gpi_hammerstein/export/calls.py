@@ -112,9 +112,18 @@ class Calls:
             value = f"late({self.part(first, first + samples)}, v[{channel}]"
             value += f", {samples})" if self.counted else ")"
             lines.append(f"{declared} late_{channel}_{samples} = {value};")
+        # loops that take several steps see it at the next sample
+        beside = f"{self.own}memory[{chain.pending + chain.states + len(chain.inputs)}]"
+        if chain.steps:
+            lines.append(f"{beside} = 0.0;")
         for own in chain.at("parallel"):
             v = f"late_{own.channel}_{own.late}" if own.late else f"v[{own.channel}]"
-            lines.append(f"y[0] += {self.call(own, v)};")
+            if chain.steps:
+                lines.append(f"{beside} += {self.call(own, v)};")
+            else:
+                lines.append(f"y[0] += {self.call(own, v)};")
+        if chain.steps:
+            return [*lines, f"y[0] += {beside};", *self.keep(chain)]
         loops = chain.at("loops")
         # no loop sees what another one has changed
         for place, own in enumerate(loops):
@@ -127,6 +136,40 @@ class Calls:
             for state in np.flatnonzero(drives):
                 lines.append(f"next[{state}] += {self.numerals.written(drives[state])} * force_{place};")
         return lines
+
+    def settle(self, chain: Chain, declared: str) -> list[str]:
+        """Return the statements of loops that take several steps from the sample before to this one.
+
+        They stand before the linear dynamics, because the states of this sample depend on them.
+        """
+        if not chain.steps:
+            return []
+        loops, size = chain.at("loops"), chain.states + len(chain.inputs)
+        before = self.part(chain.pending, chain.pending + size)
+        lines = []
+        for place, step in enumerate(chain.steps):
+            own = loops[step.loop]
+            terms = [f"dot({self.table(f'seen_{place}', step.seen)}, {before})"]
+            if np.any(step.ahead):
+                terms.append(f"dot({self.table(f'ahead_{place}', step.ahead)}, {self.signals})")
+            if own.seen is None:
+                terms.append(f"{self.own}memory[{chain.pending + size + own.channel}]")
+            for other, factor in enumerate(step.earlier):
+                terms.append(f"{self.numerals.written(factor)} * force_{other}")
+            lines.append(f"{declared} signal_{place} = {' + '.join(terms)};")
+            lines.append(f"{declared} force_{place} = {self.call(own, f'signal_{place}')};")
+        for place, step in enumerate(chain.steps):
+            for state in np.flatnonzero(step.drives):
+                written = self.numerals.written(step.drives[state])
+                lines.append(f"signals[{state}] += {written} * force_{place};")
+        return lines
+
+    def keep(self, chain: Chain) -> list[str]:
+        """Return the statements that keep what loops need of a sample at the next one: states and v."""
+        if not chain.steps:
+            return []
+        size = chain.states + len(chain.inputs)
+        return [f"{self.own}memory[{chain.pending + place}] = signals[{place}];" for place in range(size)]
 
     def read(self, chain: Chain) -> list[str]:
         """Return the statements from the displacement to the reading."""
@@ -204,7 +247,9 @@ def used_parts(chain: Chain) -> set[str]:
     used = chain.kinds
     used |= {"directional" if bank.directional else "one_sided" for bank in chain.hysteresis}
     used |= {"late"} if chain.lines else set()
-    used |= {"mixture"} if any(own.seen is not None for own in chain.operations) else set()
+    mixes = bool(chain.steps) or any(own.seen is not None for own in chain.operations)
+    used |= {"mixture"} if mixes else set()
+    used |= {"steps"} if chain.steps else set()
     used |= {"bent"} if any("exponent" in own.numbers for own in chain.at("widths")) else set()
     if chain.lines or any(own.standing is not None for own in chain.operations):
         used |= {"stand"}

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,21 @@ class Hysteresis:
 
 
 @dataclass(frozen=True)
+class LoopStep:
+    """One loop in one step from a sample to the next."""
+
+    #: The place of the loop among all loops.
+    loop: int
+    #: Factors of the states and v of a sample, and of the states and v of the next one.
+    seen: Array
+    ahead: Array
+    #: Factors of the forces of all steps before.
+    earlier: Array
+    #: What the force adds to each state.
+    drives: Array
+
+
+@dataclass(frozen=True)
 class Chain:
     """A model: y = H(G P[D[I(u)]] + d) + e + offset, one sample after the other."""
 
@@ -53,6 +68,10 @@ class Chain:
     lines: dict[tuple[int, int], int]
     #: The size of the memory of all operations and delay lines.
     memory: int
+    #: The loops in all steps from a sample to the next, where they take more than one.
+    steps: list[LoopStep] = field(default_factory=list)
+    #: The place in the memory of what they remember of the sample before: states, v, and what is beside G.
+    pending: int = 0
 
     def at(self, *places: Place) -> list[Operation]:
         """Return the operations of these places, in the order of the model."""
@@ -90,6 +109,8 @@ def chain_of(model: Model) -> Chain:
     around = Around(saved["rate"], len(a), b.shape[1], [bank.half_widths for bank in banks], a, b)
     operations = [own for effect in saved.get("effects", []) for own in _operations(effect, around)]
     placed, lines, size = _placed(operations)
+    steps = _steps(model, len(a), b.shape[1])
+    pending, size = size, size + (len(a) + b.shape[1] + len(c) if steps else 0)
     labels = {own.column: own.label for own in placed if own.column is not None}
     columns = sorted(labels)
     placed = [own if own.column is None else replace(own, column=columns.index(own.column)) for own in placed]
@@ -106,7 +127,30 @@ def chain_of(model: Model) -> Chain:
         placed,
         lines,
         size,
+        steps,
+        pending,
     )
+
+
+def _steps(model: Model, states: int, inputs: int) -> list[LoopStep]:
+    """Return the loops in all steps from a sample to the next; none where each takes a single one."""
+    intersample = json.loads(model.to_json()).get("intersample", {"substeps": 1})
+    if intersample["substeps"] == 1:
+        return []
+    rows = model.loop_steps()
+    loops = len(rows) // intersample["substeps"]
+    found = []
+    for place, row in enumerate(rows):
+        own = states - len(row["states"])
+        # behind a dead time, v leaves the last states of its shift register
+        first = own - inputs if own > 0 else states
+        seen, ahead = np.zeros(states + inputs), np.zeros(states + inputs)
+        seen[own:states] = row["states"]
+        seen[first : first + inputs] = row["inputs"]
+        ahead[first : first + inputs] = row["next"]
+        drives = np.concatenate([np.zeros(own), row["drives"]])
+        found.append(LoopStep(place % loops, seen, ahead, row["earlier"], drives))
+    return found
 
 
 def _hysteresis(own: dict[str, Any]) -> Hysteresis:

@@ -43,10 +43,12 @@ def model_in_c(model: Model, precision: Precision, name: str) -> dict[str, str]:
             for memory, table, signal in calls.standing(chain)
         ],
         "drive": calls.drive(chain),
+        "settle": calls.settle(chain, "const real"),
         "respond": calls.respond(chain, "const real"),
         "read": calls.read(chain),
     }
     values = {key: "\n".join(f"    {line}" for line in lines) for key, lines in statements.items()}
+    values["settle"] = "\n".join(f"        {line}" for line in statements["settle"])
     values |= {
         "name": name,
         "NAME": name.upper(),

@@ -39,6 +39,7 @@ def model_in_rust(model: Model, precision: Precision) -> str:
         "move": [f"v[{i}] = self.hysteresis_{i}(v[{i}], RATE);" for i in inputs],
         "start_effects": [line.replace("self.", "own.") for line in standing],
         "drive": calls.drive(chain),
+        "settle": calls.settle(chain, "let"),
         "respond": calls.respond(chain, "let"),
         "read": calls.read(chain),
     }
@@ -46,6 +47,7 @@ def model_in_rust(model: Model, precision: Precision) -> str:
         for key in ("start_hysteresis", "move"):
             statements[key] = [line.rsplit(", ", 1)[0] + ");" for line in statements[key]]
     values = {key: "\n".join(" " * 8 + line for line in lines) for key, lines in statements.items()}
+    values["settle"] = "\n".join(" " * 12 + line for line in statements["settle"])
     values |= {
         "real": numerals.real,
         "rate": numerals.written(chain.rate),

@@ -11,7 +11,7 @@ import scipy.io
 from numpy.typing import NDArray
 
 from gpi_hammerstein._native import Model, ParameterError, __version__
-from gpi_hammerstein.export.chain import Chain, chain_of
+from gpi_hammerstein.export.chain import Chain, LoopStep, chain_of
 from gpi_hammerstein.export.operations import Operation
 from gpi_hammerstein.export.templates import digest
 from gpi_hammerstein.files import require_file, write_atomically
@@ -27,7 +27,8 @@ def export_mat(model: Model, file: str | os.PathLike[str]) -> None:
     ``outputs``, ``output_units``, ``covariates`` (the columns that effects read), ``hysteresis`` (a cell for
     each input, with ``thresholds``, ``deadzone_weights``, ``reading``, ``half_widths`` and ``weights``), the
     matrices ``A``, ``B``, ``C``, ``D`` of the dynamics, ``steady`` (their states for a constant v of 1),
-    ``offsets`` and ``operations`` (a cell for each thing that an effect does to a sample). The script
+    ``offsets``, ``operations`` (a cell for each thing that an effect does to a sample) and ``steps`` (a cell
+    for each loop in each step between two samples, where there are several). The script
     ``simulate_gpi.m`` is written next to it: ``y = simulate_gpi('model.mat', u)`` has the samples of
     :meth:`Model.simulate`.
 
@@ -88,6 +89,7 @@ def written(model: Model, chain: Chain) -> bytes:
         "steady": chain.steady,
         "offsets": chain.offsets,
         "operations": cells([_fields(own) for own in chain.operations]),
+        "steps": cells([_step(own) for own in chain.steps]),
     }
     stream = io.BytesIO()
     scipy.io.savemat(stream, {"gpi": structure}, long_field_names=True)
@@ -112,6 +114,17 @@ def _fields(operation: Operation) -> dict[str, Any]:
     if operation.column is not None:
         fields["column"] = float(operation.column + 1)
     return fields
+
+
+def _step(step: LoopStep) -> dict[str, Any]:
+    """Return one loop in one step as a structure; the number of the loop begins with 1."""
+    return {
+        "loop": float(step.loop + 1),
+        "seen": step.seen,
+        "ahead": step.ahead,
+        "earlier": step.earlier,
+        "drives": step.drives,
+    }
 
 
 def cells(values: list[Any]) -> NDArray[np.object_]:

@@ -10,7 +10,7 @@
 //! 1.  dx  = (I - A)^-1 (B dv + i_x)                   at the first sample only
 //! 2.  dx += dx_0                                      at the end of the warm-up only
 //! 3.  dy  = C dx + D dv + i_y
-//! 4.  dz  = S dx + T dv + i_z   or   dy_o + i_z
+//! 4.  dz  = S dx + T dv + i_z
 //! 5.  dw  = law'(dz, dr) + i_w
 //! 6.  dreading = M dy
 //! 7.  dx+ = A dx + B dv + E dw + i_x
@@ -23,13 +23,14 @@
 //! 6'  ybar  = M' W e(k)
 //! 7'  xbar  = l,   vbar = B' l,   wbar = E' l,   l <- A' l
 //! 5'  (zbar, rbar) = law'^T wbar                      rbar: half-widths of stops, beta, gamma, n
-//! 4'  l    += S' zbar,   vbar += T' zbar   or   ybar_o += zbar
+//! 4'  l    += S' zbar,   vbar += T' zbar
 //! 3'  l    += C' ybar,   vbar += D' ybar
 //! 2'  bar of x_0 = l                                  at the end of the warm-up only
 //! 1'  m = (I - A)^-T l,   xbar += m,   vbar += B' m   at the first sample only
 //! ```
 //!
-//! An unknown that adds `f s(k)` at a place p has the gradient `f sum_k s(k) pbar(k)`. The sums of all places with all
+//! Several steps a sample go back from the last to the first, and steps 4' and 5' also give what v at the next sample and
+//! the w of earlier steps get. An unknown that adds `f s(k)` at a place p has the gradient `f sum_k s(k) pbar(k)`. The sums of all places with all
 //! signals are the products of two matrices, (places, samples) and (samples, signals), one for each block
 //! ([`Back::met`]); the injections of [`super::injections`] then choose from (places, signals). Offsets and effects
 //! whose derivatives are differences do not stream through the chain; their part is `sum_k (dy/dtheta) W e` directly.
@@ -40,12 +41,13 @@
 //! `fit::problem` compares them). Source: A. Griewank and A. Walther, *Evaluating Derivatives*, 2008, chapter 3
 //! (reverse mode).
 
+use super::between::{Between, Row};
 use super::injections::{Injection, Places, injections};
 use super::motion::{advance_adjoint, columns, rows};
 use super::point::{Freedom, Point};
 use super::stream::Stream;
 use super::table::{Group, Table};
-use super::tangents::{Trace, sensed};
+use super::tangents::{Trace, memories, sensed};
 use crate::effects::{InnerLoop, Sees, Slope};
 use crate::linear::{Section, dot};
 use crate::optimize::Loss;
@@ -53,6 +55,7 @@ use crate::parallel::install;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{DMatrixView, DVector};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Half the steepest descent of the cost of a record, `-1/2 dJ/dtheta` (unknowns), and the cost J.
 ///
@@ -133,8 +136,9 @@ struct Back<'a> {
     b: Vec<Vec<f64>>,
     d: &'a Matrix,
     loops: Vec<&'a InnerLoop>,
-    /// The column of E of each.
-    drives: Vec<Vec<f64>>,
+    between: Between,
+    /// Where the memory of each loop stands in `plays`.
+    memories: Vec<Range<usize>>,
     /// The output that each effect of the output stage acts on.
     sensed: Vec<usize>,
     places: &'a Places,
@@ -160,7 +164,8 @@ impl<'a> Back<'a> {
         let sensed = sensed(point);
         let b = columns(&sections, inputs);
         Self {
-            drives: loops.iter().map(|inner| inner.drives.column(&b)).collect(),
+            between: Between::of_sections(dynamics, point.loops(), point.intersample),
+            memories: memories(&loops),
             c: rows(&sections, outputs),
             b,
             sections,
@@ -222,8 +227,8 @@ impl<'a> Back<'a> {
         for (place, b) in v.clone().zip(&self.b) {
             work[place] += dot(b, &self.x);
         }
-        for (place, drives) in w.clone().zip(&self.drives) {
-            work[place] += dot(drives, &self.x);
+        for (place, drives) in w.clone().zip(&self.between.drives) {
+            work[place] += dot(drives, &self.x[..drives.len()]);
         }
         let mut first = 0;
         for section in &self.sections {
@@ -234,23 +239,26 @@ impl<'a> Back<'a> {
 
     /// The loops.
     fn circulate(&mut self, work: &mut [f64], mut marks: &[f64]) {
-        let Places { v, y, z, w, shapes, .. } = self.places;
-        let mut plays = &mut self.plays[..];
-        for (number, inner) in self.loops.iter().enumerate() {
-            let (own, others) = marks.split_at(inner.law.marks());
-            let (places, rest) = plays.split_at_mut(inner.law.memories());
-            let around = work[w.start + number];
+        let Places { v, next, z, w, shapes, .. } = self.places;
+        for (step, row) in self.between.seen.iter().enumerate().rev() {
+            let number = step % self.loops.len();
+            let Row { states, inputs, next: ahead, earlier } = row;
+            let law = &self.loops[number].law;
+            let (others, own) = marks.split_at(marks.len() - law.marks());
+            let around = work[w.start + step];
             let shapes = &mut work[shapes[number].clone()];
-            let sensitivity = inner.law.adjoint(around, shapes, own, places);
-            work[z.start + number] = sensitivity;
-            match &inner.sees {
-                Sees::Output(output) => work[y.start + output] += sensitivity,
-                Sees::Mixture { states, inputs } => {
-                    add(&mut self.x, sensitivity, states);
-                    add(&mut work[v.clone()], sensitivity, inputs);
-                }
+            let plays = &mut self.plays[self.memories[number].clone()];
+            let sensitivity = law.adjoint(around, shapes, own, plays);
+            work[z.start + step] = sensitivity;
+            add(&mut self.x, sensitivity, states);
+            if let Sees::Output(output) = self.loops[number].sees {
+                // what is in parallel with G
+                add(&mut self.x[states.len()..], sensitivity, &self.c[output][states.len()..]);
             }
-            (marks, plays) = (others, rest);
+            add(&mut work[v.clone()], sensitivity, inputs);
+            add(&mut work[next.clone()], sensitivity, ahead);
+            add(&mut work[w.clone()], sensitivity, earlier);
+            marks = others;
         }
     }
 

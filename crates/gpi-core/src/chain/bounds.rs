@@ -249,6 +249,7 @@ pub(crate) fn range(record: &Record, input: usize) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Intersample;
     use crate::chain::hysteresis::Parameters;
     use crate::chain::point::{DynamicsFreedom, Past};
     use crate::chain::sensitivity::Derivatives;
@@ -284,6 +285,7 @@ mod tests {
             pasts: vec![Past { plays: None, has_unknown_state: false, state: DVector::zeros(0) }],
             channels: vec![channel],
             dynamics: Sections::delayed_gain(&Matrix::from_element(1, 1, 1.0), 0),
+            intersample: Intersample::default(),
             effects: Vec::new(),
             rate: 1.0,
             offsets: vec![Matrix::zeros(1, 1)],

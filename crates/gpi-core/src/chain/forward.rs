@@ -10,11 +10,11 @@
 //!
 //! A sample runs in this order: hysteresis and its derivatives (v and dv/dtheta, [`Sensitivity`]); at the first sample
 //! the steady state of the sections at this v; at the end of the warm-up the unknown part of the initial state is added
-//! to x; y and the loops' w from x and v; the output stage; x to the next sample. Before the first sample nothing
+//! to x; y from x and v; the output stage; the loops' w and x to the next sample. Before the first sample nothing
 //! moved: the dead time brings in v(0) until sample L, while the hysteresis waits.
 //!
 //! What derivatives need of a block of samples is recorded as a [`Trace`]: for each sample one column of [`Signals`]
-//! (1, v and dv/dtheta of every input, the derivatives by the values of curves, x, w and the stops of every loop), the
+//! (1, v and dv/dtheta of every input, the derivatives by the values of curves, the same at the next sample where loops look ahead, x, w and the stops of every loop), the
 //! marks of the loops and the slopes of the output stage.
 
 use super::injections::{ONE, Signals};
@@ -111,7 +111,7 @@ impl<'a> Forward<'a> {
         let scored: Vec<usize> =
             block.clone().filter(|&k| is_scored[k]).map(|k| k - first).collect();
         let mut residuals = Matrix::zeros(self.point.dynamics.outputs(), scored.len());
-        let Signals { columns, readings, states, loops, len, .. } = &self.signals;
+        let Signals { columns, readings, states, loops, len, ahead, .. } = &self.signals;
         let mut trace = Trace {
             signals: vec![0.0; len * block.len()],
             samples: block,
@@ -121,21 +121,38 @@ impl<'a> Forward<'a> {
         };
         let Past { state, has_unknown_state, .. } = &self.point.pasts[self.index];
         let mut scored = trace.scored.iter().enumerate().peekable();
+        let delay = self.point.dynamics.delay;
+        let last = self.is_scored.len() - 1;
         let mut v = vec![0.0; self.sensitivities.len()];
+        let mut next = v.clone();
         for (place, k) in trace.samples.clone().enumerate() {
             let signals = &mut trace.signals[place * len..(place + 1) * len];
             signals[ONE] = 1.0;
-            let at = k.saturating_sub(self.point.dynamics.delay);
-            for (input, sensitivity) in self.sensitivities.iter_mut().enumerate() {
-                // what the delay brings in first is the time in which nothing moved
-                if at > 0 || k == 0 {
-                    sensitivity.step(self.drive[(at, input)], &mut self.columns[input]);
+            if k == 0 {
+                for (input, sensitivity) in self.sensitivities.iter_mut().enumerate() {
+                    sensitivity.step(self.drive[(0, input)], &mut self.columns[input]);
                 }
-                v[input] = self.columns[input][0];
-                signals[columns[input].clone()].copy_from_slice(&self.columns[input]);
             }
-            for (slopes, own) in self.readings.iter().zip(readings) {
-                signals[own.clone()].copy_from_slice(slopes.column(at).as_slice());
+            let take = |known: &[Vec<f64>], at: usize, signals: &mut [f64]| {
+                for (own, column) in columns.iter().zip(known) {
+                    signals[own.clone()].copy_from_slice(column);
+                }
+                for (slopes, own) in self.readings.iter().zip(readings) {
+                    signals[own.clone()].copy_from_slice(slopes.column(at).as_slice());
+                }
+            };
+            v.iter_mut().zip(&self.columns).for_each(|(v, column)| *v = column[0]);
+            take(&self.columns, k.saturating_sub(delay), signals);
+            // what the delay brings in first is the time in which nothing moved
+            let behind = (k + 1).saturating_sub(delay).min(last);
+            if behind > 0 && k < last {
+                for (input, sensitivity) in self.sensitivities.iter_mut().enumerate() {
+                    sensitivity.step(self.drive[(behind, input)], &mut self.columns[input]);
+                }
+            }
+            next.iter_mut().zip(&self.columns).for_each(|(next, column)| *next = column[0]);
+            if let Some(ahead) = ahead {
+                take(&self.columns, behind, &mut signals[*ahead..]);
             }
             if k == 0 {
                 self.motion.stand(&v);
@@ -145,12 +162,6 @@ impl<'a> Forward<'a> {
             }
             self.motion.observe(&v);
             signals[states.clone()].copy_from_slice(&self.motion.state);
-            for (own, around) in loops.iter().zip(&self.motion.loops.signals) {
-                signals[own.start] = around.w;
-                let stops = &mut signals[own.start + 1..own.end];
-                stops.iter_mut().zip(&around.places).for_each(|(s, place)| *s = around.z - place);
-                trace.marks.extend(&around.marks);
-            }
             let displaced: Vec<f64> = (0..self.displaced.ncols())
                 .map(|output| self.motion.displacement[output] + self.displaced[(k, output)])
                 .collect();
@@ -169,7 +180,12 @@ impl<'a> Forward<'a> {
                     residuals[(output, column)] = self.experiment.output[(k, output)] - simulated;
                 }
             }
-            self.motion.advance(&v);
+            self.motion.advance(&v, &next);
+            for (own, around) in loops.iter().zip(&self.motion.loops.signals) {
+                signals[own.start] = around.w;
+                signals[own.start + 1..own.end].copy_from_slice(&around.stops);
+                trace.marks.extend(&around.marks);
+            }
         }
         (trace, residuals)
     }

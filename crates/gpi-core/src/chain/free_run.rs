@@ -84,19 +84,22 @@ impl Point {
     ) -> Result<Matrix, Error> {
         let mut displacement = Matrix::zeros(v.nrows(), self.dynamics.outputs());
         let mut motion = Motion::new(self);
-        let mut now: Vec<f64> = v.row(0).iter().copied().collect();
+        // behind the dead time of G
+        let late = |k: usize| v.row(k.saturating_sub(self.dynamics.delay).min(v.nrows() - 1));
+        let mut now: Vec<f64> = late(0).iter().copied().collect();
+        let mut next = now.clone();
         motion.stand(&now);
         for k in 0..v.nrows() {
             if k == experiment.warmup && past.has_unknown_state {
                 motion.state.iter_mut().zip(past.state.iter()).for_each(|(x, own)| *x += own);
             }
-            let at = k.saturating_sub(self.dynamics.delay);
-            now.iter_mut().zip(v.row(at).iter()).for_each(|(now, v)| *now = *v);
+            next.iter_mut().zip(late(k + 1).iter()).for_each(|(next, v)| *next = *v);
             motion.observe(&now);
             for (output, y) in motion.displacement.iter().enumerate() {
                 displacement[(k, output)] = *y;
             }
-            motion.advance(&now);
+            motion.advance(&now, &next);
+            now.copy_from_slice(&next);
         }
         Ok(displacement)
     }
@@ -201,7 +204,9 @@ impl Point {
         let linear = self.dynamics.to_state_space()?;
         let model =
             Model::new(given.rate(), inputs, outputs, hysteresis?, linear, offsets.collect())?;
-        model.with_effects(self.blocks())
+        let model = model.with_effects(self.blocks())?;
+        let has_loops = self.loops().next().is_some();
+        if has_loops { model.with_intersample(self.intersample) } else { Ok(model) }
     }
 }
 

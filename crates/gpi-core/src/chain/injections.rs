@@ -9,12 +9,9 @@
 //! | values of a curve through which plays are read | v of its input | dv/dtheta | 1 |
 //! | a_j of a section | x_j | x_1 of the section | -1 |
 //! | b_ji | x_j | v_i | 1 |
-//! | b_ji, for each force F that enters where input i does | x_j | w | -F |
 //! | c_oj | y_o | x_j | 1 |
 //! | d_oi | y_o | v_i | 1 |
-//! | E_j of a loop | x_j | w | 1 |
-//! | a force F that enters where input i does | every x_j | w | -b_ji |
-//! | S_j, T_i of a loop | z | x_j, v_i | 1 |
+//! | a_j, b_ji, c_oj, d_oi, and E_j, S_j, T_i or the force of a loop | z and x_j, in each step | x_j, v_i, w | see `around_loops` |
 //! | ln r of a stop | half-width | 1 | r |
 //! | beta, gamma, n of Bouc and Wen's force | itself | 1 | 1 |
 //! | ln d of Dahl's friction | d | 1 | d |
@@ -38,11 +35,13 @@
 //! Sections in parallel with G have no held gain. Offsets and what is added behind the output stage have no place here
 //! (`Stream::added` gives their derivatives), nor have initial states, which start as a unit of one state.
 
+use super::around_loops::AroundLoops;
+use super::between::Between;
 use super::point::Point;
 use super::sensitivity::{Columns, Derivatives};
 use super::table::{Group, Table};
 use crate::Matrix;
-use crate::effects::{Drives, InnerLoop, Law, Place, Sees};
+use crate::effects::{InnerLoop, Law, Place};
 use crate::linear::Section;
 use std::ops::Range;
 
@@ -54,8 +53,10 @@ pub(crate) struct Signals {
     pub hysteresis: Vec<Columns>,
     /// Derivatives of v by the values of each effect that reads the plays.
     pub readings: Vec<Range<usize>>,
+    /// By how much later the same of v at the next sample stands, where loops look ahead.
+    pub ahead: Option<usize>,
     pub states: Range<usize>,
-    /// w of each loop, then its stops.
+    /// In each step: w of each loop, then its stops.
     pub loops: Vec<Range<usize>>,
     pub len: usize,
 }
@@ -66,7 +67,10 @@ pub(crate) const ONE: usize = 0;
 /// Places in the chain, as rows of the work space of a tile.
 pub(crate) struct Places {
     pub v: Range<usize>,
+    /// v at the next sample.
+    pub next: Range<usize>,
     pub y: Range<usize>,
+    /// Of each loop in each step, as is w.
     pub z: Range<usize>,
     pub w: Range<usize>,
     /// What is added to the next state.
@@ -97,9 +101,19 @@ impl Signals {
         let columns = hysteresis.iter().map(|own| take(own.len)).collect();
         let reading = point.play_curves().map(|curves| curves.values().len());
         let readings = reading.map(&mut take).collect();
+        let hysteresis_len = len - (ONE + 1);
+        let mut take = |count: usize| {
+            len += count;
+            len - count..len
+        };
+        let looks_ahead = point.loops().next().is_some() && point.intersample.looks_ahead();
+        let ahead = looks_ahead.then(|| take(hysteresis_len).start - (ONE + 1));
         let states = take(point.order());
-        let loops = point.loops().map(|inner| take(1 + inner.law.weights())).collect();
-        Self { columns, hysteresis, readings, states, loops, len }
+        let mut loops = Vec::new();
+        for _ in 0..point.intersample.substeps {
+            loops.extend(point.loops().map(|inner| take(1 + inner.law.weights())));
+        }
+        Self { columns, hysteresis, readings, ahead, states, loops, len }
     }
 }
 
@@ -110,12 +124,13 @@ impl Places {
             len += count;
             len - count..len
         };
-        let loops = point.loops().count();
-        let (v, y) = (take(point.channels.len()), take(point.dynamics.outputs()));
+        let loops = point.loops().count() * point.intersample.substeps;
+        let inputs = point.channels.len();
+        let (v, next, y) = (take(inputs), take(inputs), take(point.dynamics.outputs()));
         let (z, w) = (take(loops), take(loops));
         let states = take(point.order());
         let shapes = point.loops().map(|inner| take(inner.law.shapes())).collect();
-        Self { v, y, z, w, states, shapes, len }
+        Self { v, next, y, z, w, states, shapes, len }
     }
 }
 
@@ -128,10 +143,16 @@ pub(crate) fn injections(
     signals: &Signals,
     places: &Places,
 ) -> Vec<Injection> {
+    let around = AroundLoops::new(point);
     let mut entries = Entries { found: Vec::new(), point, signals, places };
     for (group, unknowns) in table.rows() {
-        entries.of(group, unknowns, experiment);
+        entries.of(group, unknowns.clone(), experiment);
+        for (unknown, changes) in unknowns.zip(around.by(group)) {
+            entries.around(unknown, &changes);
+        }
     }
+    // tiles take them in the order of the unknowns
+    entries.found.sort_by_key(|one| one.unknown);
     entries.found
 }
 
@@ -195,7 +216,15 @@ impl Entries<'_> {
     ) {
         let first = self.v(input) + own(&self.signals.hysteresis[input]).start;
         for (unknown, signal) in unknowns.zip(first..) {
-            self.add(unknown, self.places.v.start + input, signal, 1.0);
+            self.enter(unknown, input, signal);
+        }
+    }
+
+    /// A derivative of v enters at its own sample, and at the next one where loops look ahead.
+    fn enter(&mut self, unknown: usize, input: usize, signal: usize) {
+        self.add(unknown, self.places.v.start + input, signal, 1.0);
+        if let Some(ahead) = self.signals.ahead {
+            self.add(unknown, self.places.next.start + input, signal + ahead, 1.0);
         }
     }
 
@@ -237,13 +266,6 @@ impl Entries<'_> {
         for (place, unknown) in unknowns.enumerate() {
             let (input, j) = (place / standing.nrows(), place % standing.nrows());
             self.add(unknown, states + j, self.v(input), 1.0);
-            for (number, inner) in self.point.loops().enumerate() {
-                if let Drives::Input { input: own, force, .. } = inner.drives
-                    && own == input
-                {
-                    self.add(unknown, states + j, self.signals.loops[number].start, -force);
-                }
-            }
             for &(input, output) in held.iter().filter(|held| held.0 == input) {
                 self.add(unknown, y + output, self.v(input), -gain[(output, j)]);
             }
@@ -267,9 +289,9 @@ impl Entries<'_> {
         match self.point.effects[place].place() {
             Place::Curves(curves) => {
                 let others = before.iter().filter_map(|effect| effect.place().play_curves());
-                let (number, v) = (others.count(), self.places.v.start + curves.input());
+                let number = others.count();
                 for (unknown, signal) in unknowns.zip(self.signals.readings[number].clone()) {
-                    self.add(unknown, v, signal, 1.0);
+                    self.enter(unknown, curves.input(), signal);
                 }
             }
             Place::Loops(closed) => {
@@ -277,63 +299,66 @@ impl Entries<'_> {
                 let number: usize = others.map(|other| other.loops().len()).sum();
                 let mut first = unknowns.start;
                 for (inner, number) in closed.loops().iter().zip(number..) {
-                    first = self.around(inner, number, first);
+                    first += inner.linear_values();
+                    first = self.law(inner, number, first);
                 }
             }
             _ => {}
         }
     }
 
-    /// The values of a loop, in their order from an unknown on; returns the next unknown.
-    fn around(&mut self, inner: &InnerLoop, number: usize, first: usize) -> usize {
+    /// The values of a loop's law, in their order from an unknown on; returns the next unknown.
+    fn law(&mut self, inner: &InnerLoop, number: usize, first: usize) -> usize {
         let (places, signals) = (self.places, self.signals);
-        let own = signals.loops[number].clone();
-        let mut unknown = first;
-        if let Drives::Input { input, .. } = inner.drives {
-            // one unknown moves all states
-            for (j, b) in self.point.dynamics.driven_by(input).enumerate() {
-                self.found.push(Injection {
-                    unknown,
-                    place: places.states.start + j,
-                    signal: own.start,
-                    factor: -b,
-                });
-            }
-            unknown += 1;
-        }
-        let mut add = |place: usize, signal: usize, factor: f64| {
-            self.found.push(Injection { unknown, place, signal, factor });
-            unknown += 1;
-        };
-        if let Drives::States(column) = &inner.drives {
-            for j in 0..column.len() {
-                add(places.states.start + j, own.start, 1.0);
-            }
-        }
-        if let Sees::Mixture { states, inputs } = &inner.sees {
-            for j in 0..states.len() {
-                add(places.z.start + number, signals.states.start + j, 1.0);
-            }
-            for input in 0..inputs.len() {
-                add(places.z.start + number, signals.columns[input].start, 1.0);
-            }
-        }
         let shapes = places.shapes[number].clone();
-        match &inner.law {
-            Law::Power { .. } | Law::Speed => {}
-            // by its logarithm
-            Law::Dahl { distance, .. } => shapes.for_each(|place| add(place, ONE, *distance)),
-            Law::Stops { half_widths, weights } => {
-                for (place, r) in shapes.zip(half_widths) {
-                    // by its logarithm
-                    add(place, ONE, *r);
-                }
-                for stop in 0..weights.len() {
-                    add(places.w.start + number, own.start + 1 + stop, 1.0);
-                }
+        let factors = match &inner.law {
+            Law::Power { .. } | Law::Speed => Vec::new(),
+            // by their logarithms
+            Law::Dahl { distance, .. } => vec![*distance],
+            Law::Stops { half_widths, .. } => half_widths.clone(),
+            Law::BoucWen { .. } => vec![1.0; shapes.len()],
+        };
+        let mut unknown = first;
+        for (place, factor) in shapes.zip(factors) {
+            self.add(unknown, place, ONE, factor);
+            unknown += 1;
+        }
+        let loops = self.point.loops().count();
+        for stop in 0..inner.law.weights() {
+            for step in (number..places.w.len()).step_by(loops) {
+                self.add(unknown, places.w.start + step, signals.loops[step].start + 1 + stop, 1.0);
             }
-            Law::BoucWen { .. } => shapes.for_each(|place| add(place, ONE, 1.0)),
+            unknown += 1;
         }
         unknown
+    }
+
+    /// What an unknown changes of what loops see and drive.
+    fn around(&mut self, unknown: usize, changes: &Between) {
+        let (places, signals) = (self.places, self.signals);
+        let v: Vec<usize> = signals.columns.iter().map(|own| own.start).collect();
+        let mut add = |place: usize, signal: usize, factor: f64| {
+            if factor != 0.0 {
+                self.found.push(Injection { unknown, place, signal, factor });
+            }
+        };
+        for (step, (row, drives)) in changes.seen.iter().zip(&changes.drives).enumerate() {
+            let z = places.z.start + step;
+            for (state, factor) in row.states.iter().enumerate() {
+                add(z, signals.states.start + state, *factor);
+            }
+            for (v, factor) in v.iter().zip(&row.inputs) {
+                add(z, *v, *factor);
+            }
+            for (v, factor) in v.iter().zip(&row.next) {
+                add(z, v + signals.ahead.unwrap_or(0), *factor);
+            }
+            for (own, factor) in signals.loops.iter().zip(&row.earlier) {
+                add(z, own.start, *factor);
+            }
+            for (state, factor) in drives.iter().enumerate() {
+                add(places.states.start + state, signals.loops[step].start, *factor);
+            }
+        }
     }
 }

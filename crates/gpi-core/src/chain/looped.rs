@@ -8,9 +8,9 @@
 use crate::effects::{
     Backlash, Drives, Effect, InnerLoop, Law, OutputNonlinearity, Sees, Stiffness,
 };
-use crate::linear::StateSpace;
+use crate::linear::{Sections, StateSpace};
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
-use crate::{Channel, Experiment, Matrix, Model, Record};
+use crate::{Channel, Experiment, Hold, Intersample, Matrix, Model, Record};
 use std::ops::Range;
 
 const STATES: usize = 3;
@@ -70,6 +70,20 @@ pub(crate) fn model() -> Model {
     ];
     Model::new(100.0, u, y, hysteresis.collect(), linear.unwrap(), vec![0.0; 2])
         .and_then(|model| model.with_effects(effects.to_vec()))
+        .unwrap()
+}
+
+/// The same with loops that take three steps a sample and look ahead, behind a dead time of two samples.
+pub(crate) fn fine() -> Model {
+    let plain = model();
+    let mut late = Sections::from_state_space(plain.linear(), 0).unwrap();
+    late.delay = 2;
+    let (inputs, outputs) = (plain.inputs().to_vec(), plain.outputs().to_vec());
+    let hysteresis = plain.hysteresis().to_vec();
+    let linear = late.to_state_space().unwrap();
+    Model::new(100.0, inputs, outputs, hysteresis, linear, vec![0.0; 2])
+        .and_then(|model| model.with_effects(plain.effects().to_vec()))
+        .and_then(|model| model.with_intersample(Intersample { substeps: 3, hold: Hold::First }))
         .unwrap()
 }
 

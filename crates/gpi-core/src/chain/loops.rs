@@ -1,7 +1,7 @@
 //! Loops around the linear dynamics: values, tangents and adjoints of their laws.
 //!
 //! ```text
-//! z = S x + T v  (or an output),      w = law(z),      x+ = A x + B v + E w
+//! z = S x + T v  (or an output),      w = law(z),      x+ = A x + B v + E w      (one step a sample)
 //! ```
 //!
 //! A power has the slope `dw/dz = n (z/s)^(n-1)`. A stop `z - F_r(z)` passes a change of z while its play F sticks;
@@ -16,7 +16,7 @@
 //! value     F_i = max(z - r_i, min(z + r_i, F_i)),                  w = sum_i g_i (z - F_i)
 //! tangent   where m_i != 0:  dF_i = dz - m_i dr_i;                  dw = sum_i g_i (dz - dF_i)
 //! adjoint   zbar += g_i wbar,  Fbar_i -= g_i wbar;
-//!           where m_i != 0:  zbar += Fbar_i,  rbar_i = -m_i Fbar_i,  Fbar_i = 0
+//!           where m_i != 0:  zbar += Fbar_i,  rbar_i -= m_i Fbar_i,  Fbar_i = 0
 //! ```
 //!
 //! where `Fbar_i` arrives from the sample behind and goes on to the one before. A stop whose play slides at every
@@ -25,9 +25,9 @@
 //!
 //! The forces of Bouc and Wen and of Dahl remember the force and the last two z, and depend on the path of z alone; their steps and the
 //! derivatives of them, which are the marks, are in [`super::bouc_wen`] and [`super::dahl`]. The speed `|z - z_1|` has the sign of
-//! `z - z_1` as its mark. w(k) drives the states for sample k + 1 only, so that no
-//! loop is algebraic and all loops of a sample are evaluated independently of each other.
+//! `z - z_1` as its mark. No loop is algebraic: w of one step changes z from the next step on ([`super::between`]).
 
+use super::between::{Between, Row};
 use super::bouc_wen::{Shape, Step};
 use super::dahl::friction;
 use super::lanes::{Lanes, NONE, add};
@@ -38,69 +38,67 @@ use pulp::Simd;
 
 /// Loops in motion.
 pub(crate) struct Loops<'a> {
-    pub loops: Vec<&'a InnerLoop>,
-    /// The column of E of each.
-    drives: Vec<Vec<f64>>,
-    /// The signals of each.
+    loops: Vec<&'a InnerLoop>,
+    between: Between,
+    /// What each law remembers.
+    pub places: Vec<Vec<f64>>,
+    /// The signals of each step of a sample, loops one after the other.
     pub signals: Vec<LoopSignals>,
+    w: Vec<f64>,
 }
 
-/// The signals of one loop, its marks, and what its law remembers: the places of its plays, or w and the last two z.
+/// The signals of one loop in one step: w, its marks, and what the weights of its stops multiply.
 pub(crate) struct LoopSignals {
-    pub z: f64,
     pub w: f64,
     pub marks: Vec<f64>,
-    pub places: Vec<f64>,
+    pub stops: Vec<f64>,
 }
 
 impl<'a> Loops<'a> {
-    /// Loops in which nothing moves, around a G of these columns of B behind its dead time.
-    pub(crate) fn new(loops: impl Iterator<Item = &'a InnerLoop>, b: &[Vec<f64>]) -> Self {
-        let loops: Vec<&InnerLoop> = loops.collect();
-        let rest = |inner: &&InnerLoop| LoopSignals {
-            z: 0.0,
-            w: 0.0,
-            marks: vec![0.0; inner.law.marks()],
-            places: vec![0.0; inner.law.memories()],
+    /// Loops in which nothing moves.
+    pub(crate) fn new(loops: Vec<&'a InnerLoop>, between: Between) -> Self {
+        let rest = |number: usize| {
+            let law = &loops[number % loops.len()].law;
+            LoopSignals { w: 0.0, marks: vec![0.0; law.marks()], stops: vec![0.0; law.weights()] }
         };
-        let drives = loops.iter().map(|inner| inner.drives.column(b)).collect();
-        Self { signals: loops.iter().map(rest).collect(), drives, loops }
+        Self {
+            signals: (0..between.seen.len()).map(rest).collect(),
+            places: loops.iter().map(|inner| vec![0.0; inner.law.memories()]).collect(),
+            w: vec![0.0; between.seen.len()],
+            loops,
+            between,
+        }
     }
 
-    /// z and w of one sample, from the state of G (that of its dead time first), v and the displacements.
-    pub(crate) fn observe(&mut self, state: &[f64], v: &[f64], displacement: &[f64]) {
-        for (inner, own) in self.loops.iter().zip(&mut self.signals) {
-            own.z = inner.sees.signal(state, v, displacement);
-            own.w = inner.law.step(&mut own.places, own.z, &mut own.marks);
+    /// All steps from a sample to the next, from the state of G behind its dead time, v at both samples, and the displacement of what is
+    /// in parallel with G.
+    pub(crate) fn run(&mut self, state: &[f64], v: &[f64], next: &[f64], beside: &[f64]) {
+        let Self { loops, between, places, signals, w } = self;
+        for (number, (row, own)) in between.seen.iter().zip(signals).enumerate() {
+            let inner = number % loops.len();
+            let Row { states, inputs, next: ahead, earlier } = row;
+            let mut z = dot(states, state) + dot(inputs, v) + dot(ahead, next);
+            z += dot(earlier, &w[..earlier.len()]);
+            if let Sees::Output(output) = loops[inner].sees {
+                z += beside[output];
+            }
+            own.w = loops[inner].law.step(&mut places[inner], z, &mut own.marks);
+            w[number] = own.w;
+            for (stop, place) in own.stops.iter_mut().zip(&places[inner]) {
+                *stop = z - place;
+            }
         }
     }
 
     /// What all laws remember.
     pub(crate) fn places(&mut self) -> impl Iterator<Item = &mut f64> {
-        self.signals.iter_mut().flat_map(|own| &mut own.places)
+        self.places.iter_mut().flatten()
     }
 
-    /// Adds E w to what drives the states of G.
+    /// Adds E w to what drives the states of G behind its dead time.
     pub(crate) fn drive(&self, driven: &mut [f64]) {
-        for (drives, own) in self.drives.iter().zip(&self.signals) {
-            let first = driven.len() - drives.len();
-            let driven = driven[first..].iter_mut().zip(drives);
-            driven.for_each(|(sum, drive)| *sum += drive * own.w);
-        }
-    }
-}
-
-impl Sees {
-    /// z at a state of G and its dead time, v and the displacement of all outputs.
-    fn signal(&self, state: &[f64], v: &[f64], displacement: &[f64]) -> f64 {
-        match self {
-            Self::Output(output) => displacement[*output],
-            Self::Mixture { states, inputs } => {
-                let (late, own) = state.split_at(state.len() - states.len());
-                // what comes out of the dead time is what went in first
-                let v = if late.is_empty() { v } else { &late[late.len() - inputs.len()..] };
-                dot(states, own) + dot(inputs, v)
-            }
+        for (drives, w) in self.between.drives.iter().zip(&self.w) {
+            driven.iter_mut().zip(drives).for_each(|(sum, drive)| *sum += drive * w);
         }
     }
 }
@@ -211,7 +209,7 @@ impl Law {
     }
 
     /// The cost's sensitivity to z from that to w: the transpose of [`Law::tangent`]. `places` are the sensitivities
-    /// to what is remembered, and those to the shape are written.
+    /// to what is remembered, and those to the shape are added.
     pub(super) fn adjoint(
         &self,
         w: f64,
@@ -229,7 +227,7 @@ impl Law {
                     *place -= weight * w;
                     if mark != 0.0 {
                         z += *place;
-                        *half_width = -mark * *place;
+                        *half_width -= mark * *place;
                         *place = 0.0;
                     }
                 }
@@ -244,7 +242,7 @@ impl Law {
                 let of_f = if of_f.is_empty() { of_w } else { of_f };
                 let of = |place: usize| of_w[place] * w + of_f[place] * f;
                 z += places[1] + of(1);
-                shape.iter_mut().enumerate().for_each(|(place, own)| *own = of(4 + place));
+                shape.iter_mut().enumerate().for_each(|(place, own)| *own += of(4 + place));
                 let older = [of(2) + places[2], of(3)];
                 places.copy_from_slice(&[of(0), older[0], older[1]]);
             }

@@ -25,8 +25,13 @@ impl Model {
         Error::require_equal("states of G", ("state", state.linear.len()), ("model", order))?;
         let effects = self.effects().len();
         Error::require_equal("effects", ("state", state.effects.len()), ("model", effects))?;
-        for (memory, effect) in state.effects.iter().zip(self.effects()) {
-            let (size, may_be_empty) = remembered(effect, self.rate());
+        let closed = |effect: &Effect| effect.place().closed_loops().is_some();
+        let last = self.effects().iter().rposition(closed);
+        for (place, (memory, effect)) in state.effects.iter().zip(self.effects()).enumerate() {
+            let (mut size, may_be_empty) = remembered(effect, self.rate());
+            if Some(place) == last {
+                size += self.pending();
+            }
             if !(may_be_empty && memory.is_empty()) {
                 let name = format!("the memory of {}", effect.name());
                 Error::require_equal("values", (&name, memory.len()), ("model", size))?;

@@ -53,8 +53,11 @@
 //! - What a backlash holds before it first slides is taken as independent of the unknowns ([`sensing`]).
 
 pub(crate) mod adjoint;
+mod around_loops;
+pub(crate) mod between;
 mod bouc_wen;
 pub(crate) mod bounds;
+mod circulate;
 mod dahl;
 mod effect_columns;
 mod forward;

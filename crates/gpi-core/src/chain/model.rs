@@ -13,18 +13,18 @@
 //! G here is a state space whose dead time is a shift register among the states; a loop sees the v that leaves it. The
 //! estimator's [`super::point::Point`] has the same chain with G in sections and its dead time apart.
 
+use super::between::{Between, Row, held_inputs};
 use super::hysteresis::Parameters;
-use super::loops::Loops;
 use super::plays::Plays;
 use super::stages::Stages;
 use crate::effects::{
     ClosedLoops, Coefficients, Effect, InnerLoop, ParallelSections, Place, Quantity, SteadyForce,
     Units,
 };
-use crate::linear::{StateSpace, advance};
+use crate::linear::advance;
 use crate::model::{Model, ModelState};
 use crate::operators::{GpiState, Operator};
-use crate::{Channel, Error, Matrix};
+use crate::{Channel, Error, Intersample, LoopStep, Matrix};
 use nalgebra::DVector;
 
 impl Model {
@@ -62,6 +62,77 @@ impl Model {
     /// this order; the places themselves have a fixed order.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
+    }
+
+    /// The same model with loops that are computed in other steps between samples, without [`Model::estimates`].
+    ///
+    /// ```
+    /// use gpi_core::effects::{Drives, InnerLoop, Law, Sees, Stiffness};
+    /// use gpi_core::linear::StateSpace;
+    /// use gpi_core::operators::{Deadzones, Gpi, PlayBank, Reading};
+    /// use gpi_core::{Channel, Hold, Intersample, Matrix, Model};
+    /// // a mode of 0.7 rad a sample whose stiffness grows with the displacement
+    /// let a = Matrix::from_row_slice(2, 2, &[1.5, 1.0, -0.98, 0.0]);
+    /// let b = Matrix::from_column_slice(2, 1, &[0.24, 0.24]);
+    /// let linear = StateSpace::new(a, b, Matrix::from_row_slice(1, 2, &[1.0, 0.0]), Matrix::zeros(1, 1))?;
+    /// let envelope = Deadzones::new(vec![0.0], vec![1.0], Reading::OneSided)?;
+    /// let gpi = Gpi::new(envelope, PlayBank::new(vec![0.0], vec![1.0])?);
+    /// let channel = |name| vec![Channel::new(name, "")];
+    /// let model = Model::new(10.0, channel("u"), channel("y"), vec![gpi], linear, vec![0.0])?;
+    /// let cubic = InnerLoop {
+    ///     sees: Sees::Output(0),
+    ///     law: Law::Power { exponent: 3, scale: 1.0 },
+    ///     drives: Drives::States(vec![-0.02, -0.02]),
+    /// };
+    /// let coarse = model.with_effects(vec![Stiffness { loops: vec![cubic] }.into()])?;
+    /// let fine = coarse.clone().with_intersample(Intersample { substeps: 8, hold: Hold::Zero })?;
+    /// let input = Matrix::from_fn(50, 1, |k, _| f64::from(u8::from(k > 0)));
+    /// let difference = coarse.simulate(&input)? - fine.simulate(&input)?;
+    /// assert!(difference.amax() > 0.01 && difference.amax() < 1.0);
+    /// # Ok::<(), gpi_core::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Fewer than one or too many steps, and more than one where a pole of G is zero or negative: there is no motion between samples
+    /// then that leads to those of G.
+    pub fn with_intersample(mut self, intersample: Intersample) -> Result<Self, Error> {
+        self.intersample = intersample;
+        self.estimates = None;
+        self.prediction = None;
+        self.validate_effects()?;
+        Ok(self)
+    }
+
+    /// All loops around G in all steps of a sample, the loops of the first step first.
+    ///
+    /// ```
+    /// use gpi_core::linear::StateSpace;
+    /// use gpi_core::operators::{Deadzones, Gpi, PlayBank, Reading};
+    /// use gpi_core::{Channel, Matrix, Model};
+    /// # let gain = Matrix::from_element(1, 1, 1.0);
+    /// # let linear = StateSpace::new(Matrix::zeros(0, 0), Matrix::zeros(0, 1), Matrix::zeros(1, 0), gain)?;
+    /// # let envelope = Deadzones::new(vec![0.0], vec![1.0], Reading::OneSided)?;
+    /// # let gpi = Gpi::new(envelope, PlayBank::new(vec![0.0], vec![2.0])?);
+    /// let channel = |name| vec![Channel::new(name, "")];
+    /// let model = Model::new(10.0, channel("u"), channel("y"), vec![gpi], linear, vec![0.0])?;
+    /// assert!(model.loop_steps()?.is_empty());
+    /// # Ok::<(), gpi_core::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Dynamics that have no motion between samples, see [`Model::with_intersample`].
+    pub fn loop_steps(&self) -> Result<Vec<LoopStep>, Error> {
+        let Between { seen, drives } = self.between()?;
+        let step = |(row, drives): (Row, Vec<f64>)| {
+            let Row { states, inputs, next, earlier } = row;
+            LoopStep { states, inputs, next, earlier, drives }
+        };
+        Ok(seen.into_iter().zip(drives).map(step).collect())
+    }
+
+    /// How the loops around G are computed between samples.
+    pub fn intersample(&self) -> Intersample {
+        self.intersample
     }
 
     /// The model without the effects that the input does not drive.
@@ -125,8 +196,9 @@ impl Model {
         let (input, output) = (unit(self.inputs()), unit(self.outputs()));
         let gains = |drives: &[f64]| self.linear().gains_from_states(drives);
         let force = |inner: &InnerLoop| {
-            let b = behind_dead_time(self.linear());
-            let poles = self.linear().behind_dead_time().0.poles().ok()?;
+            let behind = self.linear().behind_dead_time().0;
+            let b = held_inputs(&behind, self.intersample())?;
+            let poles = behind.poles().ok()?;
             let over_stiffness = inner.relative_force(&b, gains)?;
             let sensitivity = self.linear().dc_gain().ok()?[(0, 0)]
                 * Parameters::from_operator(&self.hysteresis()[0]).slope();
@@ -136,6 +208,7 @@ impl Model {
     }
 
     pub(crate) fn validate_effects(&self) -> Result<(), Error> {
+        self.intersample.validate()?;
         for effect in &self.effects {
             let place = effect.place();
             let (inputs, outputs) = (self.inputs().len(), self.outputs().len());
@@ -160,7 +233,7 @@ impl Model {
                 return Err(requirement(flaw));
             }
         }
-        Ok(())
+        self.between().map(|_| ())
     }
 
     /// The states of the effects after a constant input and v.
@@ -246,37 +319,9 @@ impl Model {
             }
         }
         if has_loops {
-            self.circulate(state, v, &mut output);
+            self.circulate(state, v, &mut output)?;
         }
         Ok(output)
-    }
-
-    /// Adds what G makes of v with its loops closed.
-    fn circulate(&self, state: &mut ModelState, v: &Matrix, output: &mut Matrix) {
-        let linear = self.linear();
-        let stages = self.stages(0);
-        let mut closed: Vec<_> = stages.at(&mut state.effects, Place::closed_loops).collect();
-        let all = closed.iter().flat_map(|(own, _)| own.loops());
-        let mut loops = Loops::new(all, &behind_dead_time(linear));
-        let places = closed.iter().flat_map(|(_, memory)| memory.iter().copied());
-        loops.places().zip(places).for_each(|(place, known)| *place = known);
-        let mut drive = vec![0.0; linear.order()];
-        for k in 0..v.nrows() {
-            let now = v.row(k).transpose();
-            let before = state.linear.clone();
-            let own = linear.step(&mut state.linear, &now);
-            let displacement = output.row(k).transpose() + own;
-            output.set_row(k, &displacement.transpose());
-            loops.observe(before.as_slice(), now.as_slice(), displacement.as_slice());
-            drive.fill(0.0);
-            loops.drive(&mut drive);
-            state.linear.iter_mut().zip(&drive).for_each(|(x, drive)| *x += drive);
-        }
-        let mut places = loops.places();
-        for (own, memory) in &mut closed {
-            let memories = own.loops().iter().map(|inner| inner.law.memories()).sum();
-            **memory = places.by_ref().take(memories).map(|place| *place).collect();
-        }
     }
 
     /// The output stage, and what is added before and after it.
@@ -288,12 +333,6 @@ impl Model {
     ) {
         self.stages(state.sample).read(&mut state.effects, covariates, output);
     }
-}
-
-/// The columns of B behind the dead time.
-fn behind_dead_time(linear: &StateSpace) -> Vec<Vec<f64>> {
-    let (own, _) = linear.behind_dead_time();
-    own.b().column_iter().map(|column| column.iter().copied().collect()).collect()
 }
 
 /// The delay line and the states of an effect's sections after a constant v.

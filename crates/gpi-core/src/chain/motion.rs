@@ -1,7 +1,7 @@
 //! The linear dynamics in motion: G with its loops, and the sections in parallel with G.
 //!
 //! ```text
-//! y = C x + D v,      x+ = A x + B v + E w
+//! y = C x + D v,      x+ = A x + B v + E w      (loops with one step a sample, else see `between`)
 //! ```
 //!
 //! A is block diagonal, one block a section in observer form: `x1+ = -a1 x1 + x2 + d1`, `x2+ = -a2 x1 + d2` for what
@@ -19,6 +19,7 @@
 //! loop that feeds back at rest is not part of it, so that the state settles from there in the decay time of the closed
 //! loop.
 
+use super::between::Between;
 use super::lanes::{Lanes, add};
 use super::loops::Loops;
 use super::point::Point;
@@ -39,6 +40,8 @@ pub(crate) struct Motion<'a> {
     pub state: Vec<f64>,
     /// y, before the output stage.
     pub displacement: Vec<f64>,
+    /// The part of y that sections in parallel with G have.
+    beside: Vec<f64>,
     /// What drives each state.
     drive: Vec<f64>,
 }
@@ -50,13 +53,17 @@ impl<'a> Motion<'a> {
         let (outputs, inputs) = point.dynamics.d.shape();
         let b = columns(&sections, inputs);
         Self {
-            loops: Loops::new(point.loops(), &b),
+            loops: Loops::new(
+                point.loops().collect(),
+                Between::of_sections(&point.dynamics, point.loops(), point.intersample),
+            ),
             b,
             c: sections.iter().flat_map(|section| section.c.as_slice()).copied().collect(),
             d: point.dynamics.d.transpose().as_slice().to_vec(),
             own: point.dynamics.order(),
             state: vec![0.0; point.order()],
             displacement: vec![0.0; outputs],
+            beside: vec![0.0; outputs],
             drive: vec![0.0; point.order()],
             sections,
         }
@@ -69,7 +76,7 @@ impl<'a> Motion<'a> {
         self.state = steady.flat_map(|states| states.data.as_vec().clone()).collect();
     }
 
-    /// The displacement and the signals of the loops at this sample's v.
+    /// The displacement at this sample's v.
     pub(crate) fn observe(&mut self, v: &[f64]) {
         for (y, d) in self.displacement.iter_mut().zip(self.d.chunks_exact(v.len())) {
             *y = d.iter().zip(v).map(|(d, v)| d * v).sum();
@@ -77,11 +84,16 @@ impl<'a> Motion<'a> {
         for (x, c) in self.state.iter().zip(self.c.chunks_exact(self.displacement.len())) {
             self.displacement.iter_mut().zip(c).for_each(|(y, c)| *y += c * x);
         }
-        self.loops.observe(&self.state[..self.own], v, &self.displacement);
     }
 
-    /// Takes the state to the next sample.
-    pub(crate) fn advance(&mut self, v: &[f64]) {
+    /// Takes the state and the loops to the next sample, from v at this one and there.
+    pub(crate) fn advance(&mut self, v: &[f64], next: &[f64]) {
+        self.beside.fill(0.0);
+        let c = self.c.chunks_exact(self.beside.len()).skip(self.own);
+        for (x, c) in self.state[self.own..].iter().zip(c) {
+            self.beside.iter_mut().zip(c).for_each(|(y, c)| *y += c * x);
+        }
+        self.loops.run(&self.state[..self.own], v, next, &self.beside);
         self.drive.fill(0.0);
         for (b, v) in self.b.iter().zip(v) {
             self.drive.iter_mut().zip(b).for_each(|(sum, b)| *sum += b * v);

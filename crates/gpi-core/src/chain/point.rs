@@ -13,11 +13,12 @@
 //! parallel with G, in the order of the chain. Methods that insert or remove an effect splice the segment of every
 //! experiment, so that the other initial states keep their values.
 
-use crate::Matrix;
+use crate::chain::between::held_inputs;
 use crate::chain::hysteresis::Parameters;
 use crate::chain::sensitivity::Derivatives;
 use crate::effects::{Coefficients, Effect, InnerLoop, OutputStage, PlaceMut, SteadyForce};
 use crate::linear::{Section, Sections};
+use crate::{Intersample, Matrix};
 use nalgebra::DVector;
 use std::ops::Range;
 
@@ -40,6 +41,8 @@ pub(crate) struct Point {
     /// One hysteresis an input.
     pub channels: Vec<Parameters>,
     pub dynamics: Sections,
+    /// How loops around G are computed between samples.
+    pub intersample: Intersample,
     /// In the order of the chain.
     pub effects: Vec<Effect>,
     /// Sampling rate in Hz.
@@ -146,14 +149,29 @@ impl Point {
         let count = orders(&self.effects[place], self.rate).len();
         point.dynamics.sections.extend(self.sections().drain(first..first + count));
         let more = point.dynamics.order() - own;
-        let loops = point.effects.iter_mut().filter_map(|effect| match effect.place_mut() {
+        point.loops_mut().for_each(|inner| inner.add_states(more));
+        point
+    }
+
+    /// The point without a section of G, whose DC gain D takes where it is held.
+    pub(crate) fn without_section(&self, section: usize) -> Self {
+        let mut point = self.clone();
+        let sections = &mut point.dynamics.sections;
+        let first: usize = sections[..section].iter().map(Section::order).sum();
+        let own = first..first + sections.remove(section).order();
+        point.dynamics.hold_gain();
+        point.splice_states(own.clone(), &[]);
+        point.loops_mut().for_each(|inner| inner.drop_states(own.clone()));
+        point
+    }
+
+    /// The loops that effects close around G, to be changed.
+    pub(crate) fn loops_mut(&mut self) -> impl Iterator<Item = &mut InnerLoop> {
+        let loops = self.effects.iter_mut().filter_map(|effect| match effect.place_mut() {
             PlaceMut::Loops(closed) => Some(closed.loops_mut()),
             _ => None,
         });
-        for inner in loops.flatten() {
-            inner.add_states(more);
-        }
-        point
+        loops.flatten()
     }
 
     pub(super) fn splice_states(&mut self, range: Range<usize>, values: &[f64]) {
@@ -177,9 +195,8 @@ impl Point {
 
     /// The force of a loop in steady state, where it is known.
     pub(crate) fn steady_force(&self, inner: &InnerLoop) -> Option<SteadyForce> {
-        let inputs = 0..self.channels.len();
-        let b: Vec<Vec<f64>> =
-            inputs.map(|input| self.dynamics.driven_by(input).collect()).collect();
+        let behind = Sections { delay: 0, ..self.dynamics.clone() }.to_state_space().ok()?;
+        let b = held_inputs(&behind, self.intersample)?;
         let gains = |drives: &[f64]| Some(self.dynamics.gains_from_states(drives));
         let over_stiffness = inner.relative_force(&b, gains)?;
         let sensitivity = self.dynamics.dc_gain()[(0, 0)] * self.channels[0].slope();

@@ -6,13 +6,14 @@
 //! ```text
 //! dv(k)   = i_v                                        (inputs)
 //! dy(k)   = C dx + D dv + i_y                          (outputs)
-//! dz(k)   = S dx + T dv + i_z,  or dy_o                (loops)
+//! dz(k)   = S dx + T dv + i_z                          (loops)
 //! dw(k)   = law'(k) (dz, dr) + i_w                     (loops)
 //! dx(k+1) = A dx + B dv + E dw + i_x                   (N)
 //! dreading(k) = M(k) dy                                (outputs)
 //! ```
 //!
-//! law'(k) and M(k) are known from the pass forward: slopes of powers, which plays of stops slide, derivatives of a step
+//! Where loops take several steps a sample, z and w have one row for each loop in each step, and dz also has a part of v at the next
+//! sample and of dw in the steps before ([`super::between`]). law'(k) and M(k) are known from the pass forward: slopes of powers, which plays of stops slide, derivatives of a step
 //! of Bouc and Wen's force ([`super::loops`]), slopes of the output stage ([`super::sensing`]). dr are the injections at
 //! the half-widths of stops, at beta, gamma and n. At the first
 //! sample the state is the steady state of its injections, `dx = (I - A)^-1 (B dv + i_x)`, because the chain was at
@@ -29,6 +30,7 @@
 //!
 //! States below [`FADED`] are set to zero at the end of a block.
 
+use super::between::{Between, Row};
 use super::injections::{Places, Signals, injections};
 use super::lanes::{LANES, NONE, Weights, add};
 use super::motion::{advance_tangent, columns, rows};
@@ -70,6 +72,7 @@ pub(crate) struct Tangents<'a> {
     circulating: Weights,
     d: &'a Matrix,
     loops: Vec<&'a InnerLoop>,
+    between: Between,
     /// The output that each effect of the output stage acts on.
     sensed: Vec<usize>,
     signals: Signals,
@@ -96,21 +99,29 @@ impl<'a> Tangents<'a> {
         let shape =
             Shape { places: &places, sections: &sections, loops: &loops, sensed: sensed.len() };
         let tiles = tiles(&shape, injections, starts, table.len);
+        let between = Between::of_sections(dynamics, loops.iter().copied(), point.intersample);
         let order = point.order();
-        let mut seen = rows(&sections, dynamics.outputs());
-        seen.extend(loops.iter().map(|inner| match &inner.sees {
-            Sees::Output(_) => vec![0.0; order],
-            Sees::Mixture { states, .. } => padded(states, order),
+        let c = rows(&sections, dynamics.outputs());
+        let mut seen = c.clone();
+        // sections in parallel with G stand still between samples
+        seen.extend(between.seen.iter().zip(loops.iter().cycle()).map(|(row, inner)| {
+            let mut all = padded(&row.states, order);
+            if let Sees::Output(output) = inner.sees {
+                let own = row.states.len();
+                all[own..].copy_from_slice(&c[output][own..]);
+            }
+            all
         }));
         let b = columns(&sections, dynamics.inputs());
         let drives: Vec<Vec<f64>> =
-            loops.iter().map(|inner| padded(&inner.drives.column(&b), order)).collect();
+            between.drives.iter().map(|drives| padded(drives, order)).collect();
         Self {
             seen: Weights::new(&seen),
             driven: Weights::new(&b),
             circulating: Weights::new(&drives),
             d: &dynamics.d,
             loops,
+            between,
             tiles,
             sensed,
             signals,
@@ -154,8 +165,9 @@ impl<'a> Tangents<'a> {
     /// One tile through a block.
     #[inline(always)]
     fn advance<S: Simd>(&self, simd: S, tile: &mut Tile, trace: &Trace) {
-        let Places { v, y, z, w, states, shapes, .. } = &self.places;
+        let Places { v, next, y, z, w, states, shapes, .. } = &self.places;
         let seen = y.start..z.end;
+        let memories = memories(&self.loops);
         let mut scored = trace.scored.iter().peekable();
         tile.rows.iter_mut().for_each(Vec::clear);
         let marks = trace.marks.len() / trace.samples.len();
@@ -185,23 +197,26 @@ impl<'a> Tangents<'a> {
                 }
             }
             let mut marks = &trace.marks[k * marks..(k + 1) * marks];
-            let mut plays = &mut tile.plays[..];
-            for (number, inner) in self.loops.iter().enumerate() {
-                let mut sum = work[z.start + number];
-                match &inner.sees {
-                    Sees::Output(output) => add(simd, &mut sum, 1.0, &work[y.start + output]),
-                    Sees::Mixture { inputs, .. } => {
-                        for (factor, change) in inputs.iter().zip(&work[v.clone()]) {
-                            add(simd, &mut sum, *factor, change);
-                        }
+            for (step, row) in self.between.seen.iter().enumerate() {
+                let number = step % self.loops.len();
+                let law = &self.loops[number].law;
+                let Row { inputs, next: ahead, earlier, .. } = row;
+                let mut sum = work[z.start + step];
+                if tile.drives {
+                    let seen = inputs.iter().zip(&work[v.clone()]);
+                    for (factor, change) in seen.chain(ahead.iter().zip(&work[next.clone()])) {
+                        add(simd, &mut sum, *factor, change);
                     }
                 }
-                let (own, others) = marks.split_at(inner.law.marks());
-                let (places, rest) = plays.split_at_mut(inner.law.memories());
+                for (factor, change) in earlier.iter().zip(&work[w.clone()]) {
+                    add(simd, &mut sum, *factor, change);
+                }
+                let (own, others) = marks.split_at(law.marks());
+                let places = &mut tile.plays[memories[number].clone()];
                 let shapes = &work[shapes[number].clone()];
-                let around = inner.law.tangent(simd, sum, shapes, own, places);
-                add(simd, &mut work[w.start + number], 1.0, &around);
-                (marks, plays) = (others, rest);
+                let around = law.tangent(simd, sum, shapes, own, places);
+                add(simd, &mut work[w.start + step], 1.0, &around);
+                marks = others;
             }
             let scores = scored.next_if(|&&scored| scored == k).is_some();
             if scores || !self.sensed.is_empty() {
@@ -216,11 +231,11 @@ impl<'a> Tangents<'a> {
                 rows.for_each(|(rows, row)| rows.push(*row));
             }
             let (before, rest) = work.split_at_mut(states.start);
-            let next = &mut rest[..states.len()];
+            let driven = &mut rest[..states.len()];
             if tile.drives {
-                self.driven.scatter(simd, next, &before[v.clone()]);
+                self.driven.scatter(simd, driven, &before[v.clone()]);
             }
-            self.circulating.scatter(simd, next, &before[w.clone()]);
+            self.circulating.scatter(simd, driven, &before[w.clone()]);
             let mut first = tile.states.start;
             for section in &self.sections[tile.sections.clone()] {
                 let order = section.order();
@@ -278,6 +293,16 @@ pub(super) fn sensed(point: &Point) -> Vec<usize> {
     let mut sensed: Vec<usize> = point.output_stages().map(OutputStage::output).collect();
     sensed.sort_unstable();
     sensed
+}
+
+/// Where the memory of each loop stands among those of all.
+pub(super) fn memories(loops: &[&InnerLoop]) -> Vec<Range<usize>> {
+    let mut last = 0;
+    let own = loops.iter().map(|inner| {
+        last += inner.law.memories();
+        last - inner.law.memories()..last
+    });
+    own.collect()
 }
 
 /// Values for the states of G, with zeros for those of sections in parallel.

@@ -158,6 +158,11 @@ impl Law {
         }
     }
 
+    /// The number of its values that are estimated.
+    pub(crate) fn values(&self) -> usize {
+        self.shapes() + self.weights()
+    }
+
     /// Whether w depends on the past of z.
     pub(crate) fn has_memory(&self) -> bool {
         self.memories() > 0
@@ -165,6 +170,28 @@ impl Law {
 }
 
 impl InnerLoop {
+    /// The number of values by which it enters G: what it drives, and what it sees.
+    pub(crate) fn linear_values(&self) -> usize {
+        let drives = if let Drives::States(column) = &self.drives { column.len() } else { 1 };
+        let seen = match &self.sees {
+            Sees::Output(_) => 0,
+            Sees::Mixture { states, inputs } => states.len() + inputs.len(),
+        };
+        drives + seen
+    }
+
+    /// The same, in the order in which they are estimated.
+    pub(crate) fn linear_values_mut(&mut self) -> Vec<&mut f64> {
+        let mut all: Vec<&mut f64> = match &mut self.drives {
+            Drives::States(column) => column.iter_mut().collect(),
+            Drives::Input { force, .. } => vec![force],
+        };
+        if let Sees::Mixture { states, inputs } = &mut self.sees {
+            all.extend(states.iter_mut().chain(inputs));
+        }
+        all
+    }
+
     /// Takes states of G into account that it neither drives nor sees, behind its own.
     pub(crate) fn add_states(&mut self, count: usize) {
         match &mut self.drives {
@@ -173,6 +200,17 @@ impl InnerLoop {
         }
         if let Sees::Mixture { states, .. } = &mut self.sees {
             states.resize(states.len() + count, 0.0);
+        }
+    }
+
+    /// Leaves out states of G.
+    pub(crate) fn drop_states(&mut self, states: std::ops::Range<usize>) {
+        match &mut self.drives {
+            Drives::States(column) => drop(column.drain(states.clone())),
+            Drives::Input { states: own, .. } => *own -= states.len(),
+        }
+        if let Sees::Mixture { states: own, .. } = &mut self.sees {
+            own.drain(states);
         }
     }
 

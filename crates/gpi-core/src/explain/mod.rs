@@ -40,6 +40,7 @@ mod score;
 mod search;
 mod setup;
 mod state;
+mod steps;
 mod trial;
 mod verdict;
 

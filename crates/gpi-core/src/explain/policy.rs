@@ -17,6 +17,8 @@ pub(crate) struct SearchPolicy {
     pub ranking: RankingPolicy,
     /// How long they are fitted.
     pub fits: FitPolicy,
+    /// In how many steps loops are computed between samples.
+    pub steps: StepsPolicy,
     /// Which forces inside the mechanics are fitted too.
     pub balance: BalancePolicy,
     /// Which of them are accepted.
@@ -42,6 +44,7 @@ impl SearchPolicy {
         self.grid.validate()?;
         self.ranking.validate()?;
         self.fits.validate()?;
+        self.steps.validate()?;
         self.balance.validate()?;
         self.judgement.validate()?;
         self.examination.validate()?;
@@ -103,6 +106,15 @@ settings! {
         moving_steps: usize = 12, FROM_ONE;
         /// Part of the squares below which a step of these fits is the last: a fortieth of what an effect must take.
         gain: f64 = 1e-3, PART;
+    }
+
+    /// In how many steps loops are computed between samples.
+    struct StepsPolicy {
+        /// Twice as many steps are taken where they lower the squares by this part: what is left of the error of a step is a quarter then, or
+        /// nearer to the noise than matters for any decision. By hand.
+        least: f64 = 0.02, PART;
+        /// Most steps: a mode at a third of the sampling rate takes an eighth of a radian in one. By hand.
+        most: usize = 16, FROM_ONE;
     }
 
     /// Which effects are fitted at all.
@@ -255,6 +267,9 @@ settings! {
         /// Factor by which the held-out squares may grow without a superfluous effect. The few held-out blocks
         /// vary; the training data decide. By hand.
         superfluous: f64 = 1.5, FROM_ONE;
+        /// Part by which all squares may grow without a section of G that stands beside a mode with a loop: 2.5 % of the error. What explains so little
+        /// far from the noise may stand for anything, and the force of the loop is what it costs. By hand.
+        section: f64 = 0.05, PART;
         /// Factor by which the held-out squares may grow when a driven effect replaces a slow function of time. By hand.
         driven_instead: f64 = 1.05, FROM_ONE;
         /// Fits that are compared after an exchange take so many times the steps of a trial: they start farther from

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | an effect is superfluous | `lost` < threshold of the newest effect, and `T_without < f T_with` |
 //! | the hysteresis is superfluous beside a loop around G | `lost` < q ln N for its q parameters, and `T_without < f T_with` |
+//! | a section of G without resonance is superfluous beside a loop | `J_without <= (1 + f) J`, and `T_without <= (1 + f) T` |
 //! | an added signal moves to the other side of the output stage | `J_moved < (1 - f) J` |
 //! | a slow function of time is replaced | see [`super::exchange`] |
 //! | an effect replaces slow poles of G | `J_effect <= f J_poles` at the end of the search, else the poles return |
@@ -25,7 +26,8 @@ use crate::Progress;
 use crate::effects::{Entry, FreeOrder, Place, Signature};
 use crate::fit::line_modes::{is_same, line_modes};
 use crate::fit::memory::Memory;
-use crate::fit::minimize::Fitted;
+use crate::fit::minimize::{FitOptions, Fitted};
+use crate::linear::resonates;
 use crate::progress::as_trial;
 use nalgebra::Complex;
 
@@ -96,6 +98,38 @@ pub(super) fn straighten(state: &mut SearchState, progress: Progress) -> Result<
     let then = state.held_out(&fitted.point)?;
     if is_superfluous(lost, price, [&now, &then], state.setup.policy.revision.superfluous) {
         (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
+    }
+    Ok(())
+}
+
+/// Takes sections out of G that stood for what a loop does now: those that have no resonance, beside one that has.
+///
+/// Such a section takes a share of what the loop drives, which is then no longer the force on the mode.
+pub(super) fn shed_sections(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+    let has_loops = state.point.loops().next().is_some();
+    if state.setup.order_is_given || !has_loops || !state.point.dynamics.has_resonance() {
+        return Ok(());
+    }
+    let mut section = 0;
+    while section < state.point.dynamics.sections.len() {
+        let mut poles = state.point.dynamics.sections[section].poles().into_iter();
+        if poles.any(|pole| resonates(&pole)) {
+            section += 1;
+            continue;
+        }
+        let without = state.point.without_section(section);
+        let steps = state.setup.policy.fits.far_steps;
+        let options = FitOptions { steps, ..state.setup.options.clone() };
+        let fitted = state.fit(without, &options, "rearrangement", progress)?;
+        let squares = |point| Ok::<f64, Error>(state.held_out(point)?.iter().sum());
+        let most = 1.0 + state.setup.policy.revision.section;
+        let is_needed = fitted.linearization.cost > most * state.cost
+            || squares(&fitted.point)? > most * squares(&state.point)?;
+        if is_needed {
+            section += 1;
+        } else {
+            (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
+        }
     }
     Ok(())
 }

@@ -7,9 +7,12 @@ use super::grid::refine_grids;
 use super::judgement::{Evidence, Refusal, choose, judge, refusal};
 use super::probability::probabilities;
 use super::ranking::{ranked, scored_beside};
-use super::revision::{drop_superfluous, rearrange, shed_lags, shed_lines, straighten};
+use super::revision::{
+    drop_superfluous, rearrange, shed_lags, shed_lines, shed_sections, straighten,
+};
 use super::setup::SearchSetup;
 use super::state::{Addition, Rejected, SearchState, Trial};
+use super::steps::finer_steps;
 use super::trial::{join_modes, trial, trials as trials_of};
 use crate::Error;
 use crate::effects::{Entry, FreeOrder, Signature, Stage};
@@ -154,6 +157,9 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     state.add(Addition { trial, others, probability, dropped: Vec::new() })?;
     // the grids were placed before this effect was known
     state.is_rich = false;
+    if finer_steps(state, progress)? {
+        shed_sections(state, progress)?;
+    }
     rearrange(state, progress)?;
     drop_superfluous(state, progress)?;
     straighten(state, progress)?;

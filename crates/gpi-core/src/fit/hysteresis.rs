@@ -15,7 +15,7 @@ use crate::linear::Sections;
 use crate::operators::Reading;
 use crate::optimize::{Loss, Status};
 use crate::progress::{Overall, Progress, Report};
-use crate::{Channel, Error, Experiment, Hysteresis, Matrix, Record};
+use crate::{Channel, Error, Experiment, Hysteresis, Intersample, Matrix, Record};
 use nalgebra::DVector;
 
 /// The first sample from which no play remembers its start: z has spanned twice the widest half-width.
@@ -110,6 +110,7 @@ pub fn fit_hysteresis(
     let point = Point {
         channels: vec![parameters],
         dynamics: Sections::delayed_gain(&Matrix::from_element(1, 1, 1.0), 0),
+        intersample: Intersample::default(),
         effects: Vec::new(),
         rate: 1.0,
         pasts: vec![Past { plays, has_unknown_state: true, state: DVector::zeros(0) }],

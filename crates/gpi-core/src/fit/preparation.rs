@@ -17,7 +17,7 @@ use crate::fit::hysteresis::forgets_at;
 use crate::fit::model_sections::sections_of;
 use crate::fit::settings::{FitSettings, PreparationSettings};
 use crate::linear::Sections;
-use crate::{Error, Experiment, Matrix, Model, Record};
+use crate::{Error, Experiment, Intersample, Matrix, Model, Record};
 use nalgebra::DVector;
 
 /// A record made ready, and hysteresis parameters to start from.
@@ -130,7 +130,8 @@ impl<'a> Prepared<'a> {
         let offsets = vec![Matrix::zeros(1, self.means.len()); pasts.len()];
         let channels = self.channels.clone();
         let (effects, rate) = (Vec::new(), self.record.rate());
-        let mut point = Point { channels, dynamics, effects, rate, pasts, offsets };
+        let intersample = Intersample::default();
+        let mut point = Point { channels, dynamics, intersample, effects, rate, pasts, offsets };
         self.settle(&mut point);
         point
     }
@@ -138,7 +139,8 @@ impl<'a> Prepared<'a> {
     /// The dynamics and effects of a model behind the prepared hysteresis, the gain in the plays.
     pub(crate) fn point_of(&self, model: &Model) -> Result<Point, Error> {
         let (dynamics, effects) = sections_of(model)?;
-        let point = self.point(dynamics);
+        let mut point = self.point(dynamics);
+        point.intersample = model.intersample();
         let mut point = effects.into_iter().fold(point, |point, effect| point.with_effect(effect));
         rescale(&mut point);
         Ok(point)

@@ -153,21 +153,26 @@ fn add(equations: &mut NormalEquations, rows: Rows, loss: &Loss) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Model;
     use crate::chain::hysteresis::Parameters;
-    use crate::chain::looped::{model, record, run};
+    use crate::chain::looped::{fine, model, record, run};
     use crate::chain::point::DynamicsFreedom;
     use crate::chain::sensitivity::Derivatives;
     use crate::fit::preparation::Prepared;
 
     #[test]
     fn gradient_is_the_one_that_all_derivatives_give() {
-        let model = model();
+        compare(&model());
+        compare(&fine());
+    }
+
+    fn compare(model: &Model) {
         // one with a run-in from rest, and one of unknown initial state that holds samples out
         let runs = vec![run(1.5, 0.0, 130, vec![]), run(1.5, 0.3, 0, vec![300..420, 500..520])];
-        let record = record(&model, runs);
+        let record = record(model, runs);
         let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
         let prepared = Prepared::scoring_all(&record, channels).unwrap();
-        let mut point = prepared.point_of(&model).unwrap();
+        let mut point = prepared.point_of(model).unwrap();
         point.dynamics.delay = 2;
         point.pasts[1].state.iter_mut().enumerate().for_each(|(j, x)| *x = 0.1 * (j + 1) as f64);
         let freedom = Freedom {

@@ -22,7 +22,7 @@ use crate::progress::interruptible;
 use crate::record::Record;
 use gpi_core::compensate::CompensateOptions;
 use gpi_core::identify::{functions_of_time, on_another_record, residuals_from_fitted_start};
-use gpi_core::{Matrix, SimulationError};
+use gpi_core::{LoopStep, Matrix, SimulationError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -312,6 +312,21 @@ impl Model {
     ///     A text, which ``print`` and a notebook show as a table.
     fn summary<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("gpi_hammerstein.summary")?.call_method1("summary", (slf,))
+    }
+
+    #[doc = include_str!("../docs/model/loop_steps.txt")]
+    fn loop_steps<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let steps = self.model.loop_steps().map_err(to_python)?;
+        let written = |step: LoopStep| {
+            let fields = PyDict::new(py);
+            fields.set_item("states", from_vector(py, &step.states))?;
+            fields.set_item("inputs", from_vector(py, &step.inputs))?;
+            fields.set_item("next", from_vector(py, &step.next))?;
+            fields.set_item("earlier", from_vector(py, &step.earlier))?;
+            fields.set_item("drives", from_vector(py, &step.drives))?;
+            Ok(fields)
+        };
+        steps.into_iter().map(written).collect()
     }
 
     #[doc = include_str!("../docs/model/to_json.txt")]

@@ -95,6 +95,12 @@ void ${name}_step(${name}_state *state, const real *input, real *output)
         v[i] = state->input[i];
 $drive
 $move
+@steps
+    /* the loops from the sample before to this one */
+    if (state->sample > 0) {
+$settle
+    }
+@end
     multiply(signals, next);
 $respond
     for (i = 0; i < STATES; ++i)

@@ -95,6 +95,12 @@ $move
         let mut signals = [0.0; STATES + INPUTS];
         signals[..STATES].copy_from_slice(&self.states);
         signals[STATES..].copy_from_slice(&v);
+@steps
+        // the loops from the sample before to this one
+        if self.sample > 0 {
+$settle
+        }
+@end
         let mut next = [0.0; STATES];
         let mut y = [0.0; OUTPUTS];
         multiply(&signals, &mut next, &mut y);

@@ -169,15 +169,20 @@ function y = dynamics(model, v, standing)
         deviation = [zeros(late, 1); v(1:end-late, c) - standing(c)];
         y(:, 1) = y(:, 1) + section(own{1}, deviation, standing(c));
     end
+    beside = y;
     loops = at(model, 'loops');
     places = cellfun(@(own) zeros(own.memory, 1), loops, 'UniformOutput', false);
     x = model.steady * standing(:);
     for k = 1:samples
         now = v(k, :)';
+        if k > 1 && ~isempty(model.steps)
+            [x, places] = settled(model, loops, places, x, now, before, beside(k - 1, :));
+        end
+        before = [x; now];
         seen = y(k, :)' + model.C * x + model.D * now;
         y(k, :) = seen';
         next = model.A * x + model.B * now;
-        for i = 1:numel(loops)
+        for i = 1:numel(loops) * isempty(model.steps)
             own = loops{i};
             signal = seen(own.channel);
             if isfield(own, 'seen')
@@ -187,6 +192,24 @@ function y = dynamics(model, v, standing)
             next = next + own.drives(:) * force;
         end
         x = next;
+    end
+end
+
+function [x, places] = settled(model, loops, places, x, now, before, beside)
+% The states behind loops that take several steps from the sample before, (x; v) = before, to this one.
+    forces = zeros(0, 1);
+    ahead = [x; now];
+    for i = 1:numel(model.steps)
+        step = model.steps{i};
+        own = loops{step.loop};
+        signal = step.seen(:)' * before + step.ahead(:)' * ahead + step.earlier(:)' * forces;
+        if ~isfield(own, 'seen')
+            signal = signal + beside(own.channel);
+        end
+        [forces(i, 1), places{step.loop}] = law(own, signal, places{step.loop});
+    end
+    for i = 1:numel(model.steps)
+        x = x + model.steps{i}.drives(:) * forces(i);
     end
 end
 

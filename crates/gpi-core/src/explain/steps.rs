@@ -1,0 +1,46 @@
+//! In how many steps loops are computed between two samples, and how v is held meanwhile: what the data prefer.
+//!
+//! Nothing is added to the model, so that less squares on the training samples decide. The steps are doubled as long as that pays.
+
+use super::state::SearchState;
+use crate::Error;
+use crate::fit::minimize::FitOptions;
+use crate::progress::Progress;
+use crate::{Hold, Intersample};
+
+/// Computes the loops of the model in more steps where the data ask for it; says whether the model became another.
+///
+/// Loops around several inputs or outputs keep one step a sample: each step costs as much as a simulation with all loops.
+pub(super) fn finer_steps(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    let policy = &state.setup.policy.steps;
+    let has_one = state.point.channels.len() == 1 && state.point.dynamics.outputs() == 1;
+    if !has_one || state.point.loops().next().is_none() {
+        return Ok(false);
+    }
+    let mut changed = false;
+    loop {
+        let present = state.point.intersample;
+        let substeps = 2 * present.substeps;
+        if substeps > policy.most {
+            break;
+        }
+        let holds =
+            if present.is_plain() { &[Hold::First, Hold::Zero][..] } else { &[present.hold] };
+        let mut best = None;
+        for &hold in holds {
+            let mut point = state.point.clone();
+            point.intersample = Intersample { substeps, hold };
+            let steps = state.setup.policy.fits.far_steps;
+            let options = FitOptions { steps, ..state.setup.options.clone() };
+            let fitted = state.fit(point, &options, "steps between samples", progress)?;
+            let (point, cost) = (fitted.point, fitted.linearization.cost);
+            if cost < best.as_ref().map_or((1.0 - policy.least) * state.cost, |&(_, cost)| cost) {
+                best = Some((point, cost));
+            }
+        }
+        let Some((point, cost)) = best else { break };
+        (state.point, state.cost) = (point, cost);
+        changed = true;
+    }
+    Ok(changed)
+}
