@@ -66,6 +66,7 @@ LOOP = closed(
                     }
                 ),
                 {"const": "speed"},
+                closed({"damping": closed({"scale": size("in the unit of z")})}),
             ]
         },
         "drives": {

@@ -62,7 +62,12 @@ EFFECTS: dict[str, dict[str, Any]] = {
                 "sees": {"output": 0},
                 "law": {"power": {"exponent": 3, "scale": 4.0}},
                 "drives": [-0.02, 0.01, 0.005],
-            }
+            },
+            {
+                "sees": {"output": 0},
+                "law": {"damping": {"scale": 0.2}},
+                "drives": [-0.03, 0.02, 0.0],
+            },
         ]
     },
     "hysteretic-stiffness": {

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 STEP = 0.7
 #: Stiffness 1, with a cubic part.
 CUBIC, DAMPING = 0.2, 0.8
+#: The speed at which a force that depends on it is near its limit.
+SPEED = 0.3
 F = np.array([[0.0, 1.0], [-1.0, -DAMPING]])
 G = np.array([[0.0], [1.0]])
 
@@ -40,7 +42,8 @@ def sampled(hold: str) -> tuple[Array, ...]:
     return a, constant + (a - np.eye(2)) @ late, c, c @ late, constant
 
 
-def oscillator(hold: str, substeps: int) -> gpi.Model:
+def oscillator(hold: str, substeps: int, limit: float = 0.0) -> gpi.Model:
+    """The oscillator; a force up to `limit` opposes its speed, besides the linear damping."""
     a, b, c, d, force = sampled(hold)
     described = json.loads(model_of(plant()).to_json())
     described["hysteresis"] = [
@@ -58,13 +61,18 @@ def oscillator(hold: str, substeps: int) -> gpi.Model:
         "law": {"power": {"exponent": 3, "scale": 1.0}},
         "drives": (-CUBIC * force[:, 0]).tolist(),
     }
-    described["effects"] = [{"name": "stiffness", "loops": [cubic]}]
+    damping = {
+        "sees": {"output": 0},
+        "law": {"damping": {"scale": SPEED * STEP}},
+        "drives": (-limit / (SPEED * STEP) * force[:, 0]).tolist(),
+    }
+    described["effects"] = [{"name": "stiffness", "loops": [cubic, *([damping] if limit else [])]}]
     described["intersample"] = {"substeps": substeps, "hold": hold}
     described["offsets"] = [0.0]
     return gpi.Model.from_json(json.dumps(described))
 
 
-def integrated(v: Array, hold: str) -> Array:
+def integrated(v: Array, hold: str, limit: float = 0.0) -> Array:
     """The displacement by an integrator of others, sample by sample; v is zero before the record."""
     x = np.zeros(2)
     y = np.zeros(len(v))
@@ -75,7 +83,8 @@ def integrated(v: Array, hold: str) -> Array:
         slope = (v[k + 1] - v[k]) / STEP if hold == "first" else 0.0
 
         def motion(t: float, x: Array, k: int = k, slope: float = slope) -> list[float]:
-            return [x[1], v[k] + slope * t - DAMPING * x[1] - x[0] - CUBIC * x[0] ** 3]
+            rubs = limit * np.tanh(x[1] / SPEED)
+            return [x[1], v[k] + slope * t - DAMPING * x[1] - x[0] - CUBIC * x[0] ** 3 - rubs]
 
         x = solve_ivp(motion, (0.0, STEP), x, rtol=1e-10, atol=1e-12).y[:, -1]
     return y
@@ -96,8 +105,22 @@ def test_more_steps_come_nearer_to_the_differential_equation(hold: str) -> None:
 
 
 @pytest.mark.parametrize("hold", ["zero", "first"])
+def test_the_force_of_a_damping_comes_nearer_too(hold: str) -> None:
+    v = driven()
+    v[0] = 0.0
+    expected = integrated(v, hold, 0.2)
+    assert np.abs(integrated(v, hold) - expected).max() > 0.1
+    errors = [
+        float(np.abs(oscillator(hold, substeps, 0.2).simulate(v) - expected).max()) for substeps in (4, 8, 16)
+    ]
+    # the change of a step is the speed half a step before
+    assert errors[1] < errors[0] / 1.7 and errors[2] < errors[1] / 1.7, errors
+    assert errors[2] < 0.01 * np.abs(expected).max(), errors
+
+
+@pytest.mark.parametrize("hold", ["zero", "first"])
 def test_derivatives_go_through_the_steps(hold: str) -> None:
-    model, v = oscillator(hold, 3), driven()
+    model, v = oscillator(hold, 3, 0.1), driven()
     described = json.loads(model.to_json())
 
     def simulated(change: Callable[[dict[str, Any], float], None], step: float) -> Array:
@@ -121,7 +144,13 @@ def test_derivatives_go_through_the_steps(hold: str) -> None:
     transform = np.vstack([c, c @ a - np.trace(a) * c])
     columns = jacobian[:, [names.index(f"stiffness.value[{place}]") for place in range(2)]] @ transform
     computed = [*columns.T, jacobian[:, names.index("u.weights[0]")]]
-    for change, column in zip([force(0), force(1), weight], computed, strict=True):
+    # by the logarithm of the scale
+    computed.append(jacobian[:, names.index("stiffness.value[4]")])
+
+    def scale(moved: dict[str, Any], step: float) -> None:
+        moved["effects"][0]["loops"][1]["law"]["damping"]["scale"] *= np.exp(step)
+
+    for change, column in zip([force(0), force(1), weight, scale], computed, strict=True):
         expected = (simulated(change, 1e-5) - simulated(change, -1e-5)) / 2e-5
         np.testing.assert_allclose(column, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
@@ -144,7 +173,7 @@ def test_a_model_says_how_its_loops_are_computed() -> None:
     rows = first.loop_steps()
     assert [len(row["earlier"]) for row in rows] == [0, 1]
     assert json.loads(first.to_json())["intersample"] == {"substeps": 2, "hold": "first"}
-    assert "intersample" not in json.loads(oscillator("first", 1).to_json())
+    assert "intersample" not in json.loads(oscillator("zero", 1).to_json())
     # the row of C, and no v behind a sample
     row = oscillator("zero", 1).loop_steps()[0]
     np.testing.assert_array_equal(row["states"], [1.0, 0.0])

@@ -47,9 +47,14 @@ impl Intersample {
         self.substeps > 1 && self.hold == Hold::First
     }
 
-    /// Whether it is the default, which model files leave out.
-    pub(crate) fn is_plain(&self) -> bool {
+    /// Whether there is one step a sample.
+    pub(crate) fn is_plain(self) -> bool {
         self.substeps == 1
+    }
+
+    /// Whether model files leave it out.
+    pub(crate) fn is_default(&self) -> bool {
+        *self == Self::default()
     }
 
     pub(crate) fn validate(self) -> Result<(), Error> {

@@ -28,7 +28,7 @@ pub struct Model {
     offsets: Vec<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) effects: Vec<Effect>,
-    #[serde(default, skip_serializing_if = "Intersample::is_plain")]
+    #[serde(default, skip_serializing_if = "Intersample::is_default")]
     pub(crate) intersample: Intersample,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) estimates: Option<Estimates>,

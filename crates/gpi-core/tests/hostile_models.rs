@@ -45,7 +45,8 @@ fn effects() -> Vec<Value> {
         json!({"name": "stiffness", "loops": [
             {"sees": {"output": 0}, "law": {"power": {"exponent": 3, "scale": 1.0}}, "drives": [0.01]},
             {"sees": {"mixture": {"states": [0.2], "inputs": [0.1]}},
-                "law": {"stops": {"half_widths": [0.1], "weights": [0.2]}}, "drives": [0.01]}]}),
+                "law": {"stops": {"half_widths": [0.1], "weights": [0.2]}}, "drives": [0.01]},
+            {"sees": {"output": 0}, "law": {"damping": {"scale": 0.5}}, "drives": [0.01]}]}),
         json!({"name": "hysteretic-stiffness", "loops": [
             {"sees": {"output": 0}, "drives": [-0.01],
                 "law": {"bouc-wen": {"beta": 0.5, "gamma": -0.2, "exponent": 1.5}}}]}),
@@ -77,6 +78,9 @@ fn model(effects: &[Value]) -> Value {
         Model::new(100.0, channel("u"), channel("y"), hysteresis, linear, vec![7.0]).unwrap();
     let mut described: Value = serde_json::from_str(&model.to_json().unwrap()).unwrap();
     described["effects"] = effects.to_vec().into();
+    if effects.len() % 2 == 0 {
+        described["intersample"] = json!({"substeps": 2, "hold": "first"});
+    }
     described
 }
 

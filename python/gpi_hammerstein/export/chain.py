@@ -106,10 +106,12 @@ def chain_of(model: Model) -> Chain:
         for values, rows, columns in (saved["linear"][name] for name in "abcd")
     )
     banks = [_hysteresis(own) for own in saved["hysteresis"]]
-    around = Around(saved["rate"], len(a), b.shape[1], [bank.half_widths for bank in banks], a, b)
+    substeps = saved.get("intersample", {"substeps": 1})["substeps"]
+    widths = [bank.half_widths for bank in banks]
+    around = Around(saved["rate"], len(a), b.shape[1], widths, a, b, substeps)
     operations = [own for effect in saved.get("effects", []) for own in _operations(effect, around)]
     placed, lines, size = _placed(operations)
-    steps = _steps(model, len(a), b.shape[1])
+    steps = _steps(model, substeps, len(a), b.shape[1])
     pending, size = size, size + (len(a) + b.shape[1] + len(c) if steps else 0)
     labels = {own.column: own.label for own in placed if own.column is not None}
     columns = sorted(labels)
@@ -132,13 +134,12 @@ def chain_of(model: Model) -> Chain:
     )
 
 
-def _steps(model: Model, states: int, inputs: int) -> list[LoopStep]:
+def _steps(model: Model, substeps: int, states: int, inputs: int) -> list[LoopStep]:
     """Return the loops in all steps from a sample to the next; none where each takes a single one."""
-    intersample = json.loads(model.to_json()).get("intersample", {"substeps": 1})
-    if intersample["substeps"] == 1:
+    if substeps == 1:
         return []
     rows = model.loop_steps()
-    loops = len(rows) // intersample["substeps"]
+    loops = len(rows) // substeps
     found = []
     for place, row in enumerate(rows):
         own = states - len(row["states"])

@@ -28,6 +28,8 @@ class Around:
     #: A and B of the dynamics.
     a: Array
     b: Array
+    #: Steps of the loops from one sample to the next.
+    substeps: int
 
 
 def share(time_constant: float, rate: float) -> float:
@@ -155,7 +157,11 @@ def _loop(inner: Parameters, around: Around) -> Operation:
         numbers = {"distance": law["distance"], "averaged": int(law["averaged"])}
         return Operation("dahl", "loops", output, numbers, memory=3, seen=seen, drives=drives)
     if inner["law"] == "speed":
-        return Operation("speed", "loops", output, memory=1, seen=seen, drives=drives)
+        numbers = {"pace": float(around.substeps)}
+        return Operation("speed", "loops", output, numbers, memory=1, seen=seen, drives=drives)
+    if "damping" in inner["law"]:
+        numbers = {"scale": inner["law"]["damping"]["scale"], "pace": float(around.substeps)}
+        return Operation("damping", "loops", output, numbers, memory=1, seen=seen, drives=drives)
     law = inner["law"]["stops"]
     arrays = {key: np.array(law[key]) for key in ("half_widths", "weights")}
     count = len(law["weights"])

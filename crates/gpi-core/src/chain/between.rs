@@ -20,13 +20,12 @@
 //! For a first-order hold, x is the state of the continuous system less `d v`: what a change of v within the last sample has moved, which
 //! D contains. E is what a w that stays constant for a sample drives. What w of a step moves until its middle is left out: a force moves a mass by a part of the
 //! square of the step, so that the error of M steps is that of the midpoint rule, proportional to 1/M^2. With one step a sample, loops see the
-//! sample itself, `z = c x + t v`, and `x+ = A x + B v + E w`: half a sample late, which is the price of a v that is known already. The speed is
-//! counted by the sample: its w is M times the change of z from step to step. A force that enters where an input does drives
+//! sample itself, `z = c x + t v`, and `x+ = A x + B v + E w`: half a sample late, which is the price of a v that is known already. A force that enters where an input does drives
 //! `E = -force phi_1(N) g`, what a constant input drives in a sample; at M = 1 that is B.
 //!
 //! Sections in parallel with G are slow: between samples they stand still.
 
-use crate::effects::{InnerLoop, Law, Sees};
+use crate::effects::{InnerLoop, Sees};
 use crate::linear::{Sections, StateSpace, logarithm};
 use crate::{Hold, Intersample, Matrix};
 
@@ -76,10 +75,7 @@ impl Between {
         let b = columns(motion.as_ref().map_or(system.b(), |motion| &motion.held));
         let mut e = Matrix::zeros(system.order(), loops.len());
         for (mut column, inner) in e.column_iter_mut().zip(loops) {
-            column.copy_from_slice(&inner.drives.column(&b));
-            if inner.law == Law::Speed {
-                column *= steps as f64;
-            }
+            last(column.as_mut_slice(), &inner.drives.column(&b));
         }
         let (c, t) = seen(system, loops);
         let (moments, step) = match &motion {
@@ -152,6 +148,12 @@ pub(crate) fn held_inputs(system: &StateSpace, intersample: Intersample) -> Opti
     Some(columns(&Motion::new(system, intersample.hold)?.held))
 }
 
+/// Values for the last states; those before have none.
+fn last(all: &mut [f64], values: &[f64]) {
+    let first = all.len() - values.len();
+    all[first..].copy_from_slice(values);
+}
+
 fn columns(matrix: &Matrix) -> Vec<Vec<f64>> {
     matrix.column_iter().map(|column| column.iter().copied().collect()).collect()
 }
@@ -174,8 +176,10 @@ fn seen(system: &StateSpace, loops: &[&InnerLoop]) -> (Matrix, Matrix) {
                 t.set_row(number, &system.d().row(*output));
             }
             Sees::Mixture { states, inputs } => {
-                c.row_mut(number).iter_mut().zip(states).for_each(|(own, value)| *own = *value);
-                t.row_mut(number).iter_mut().zip(inputs).for_each(|(own, value)| *own = *value);
+                let mut row = vec![0.0; system.order()];
+                last(&mut row, states);
+                c.row_mut(number).copy_from_slice(&row);
+                t.row_mut(number).copy_from_slice(inputs);
             }
         }
     }

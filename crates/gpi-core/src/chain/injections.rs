@@ -14,7 +14,7 @@
 //! | a_j, b_ji, c_oj, d_oi, and E_j, S_j, T_i or the force of a loop | z and x_j, in each step | x_j, v_i, w | see `around_loops` |
 //! | ln r of a stop | half-width | 1 | r |
 //! | beta, gamma, n of Bouc and Wen's force | itself | 1 | 1 |
-//! | ln d of Dahl's friction | d | 1 | d |
+//! | ln d of Dahl's friction, ln of the scale of a damping | itself | 1 | itself |
 //! | weight of a stop | w | z - F, the stop | 1 |
 //!
 //! A is in observer form, so that a_j multiplies the first state only: `dA/da_j = -e_j e_1'`.
@@ -314,7 +314,7 @@ impl Entries<'_> {
         let factors = match &inner.law {
             Law::Power { .. } | Law::Speed => Vec::new(),
             // by their logarithms
-            Law::Dahl { distance, .. } => vec![*distance],
+            Law::Dahl { distance: scale, .. } | Law::Damping { scale } => vec![*scale],
             Law::Stops { half_widths, .. } => half_widths.clone(),
             Law::BoucWen { .. } => vec![1.0; shapes.len()],
         };

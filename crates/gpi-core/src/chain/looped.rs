@@ -1,7 +1,7 @@
 //! A plant with every kind of thing in the loops around G and behind them, for tests.
 //!
-//! Two inputs and two outputs, three states, five loops: one sum of stops that sees a mixture of states and inputs, a
-//! cubic power, a force of Bouc and Wen, Dahl's friction and a speed that see an output each, a backlash and a polynomial behind one output. The gains of
+//! Two inputs and two outputs, three states, six loops: one sum of stops that sees a mixture of states and inputs, a
+//! cubic power, a force of Bouc and Wen, Dahl's friction, a speed and a damping that see an output each, a backlash and a polynomial behind one output. The gains of
 //! the loops are small enough that the plant stays in motion and that plays and stops both stick and slide within a
 //! run.
 
@@ -42,6 +42,11 @@ fn stiffness() -> Stiffness {
                 drives: force,
             },
             InnerLoop { sees: Sees::Output(1), law: Law::Speed, drives: drives(0.05) },
+            InnerLoop {
+                sees: Sees::Output(0),
+                law: Law::Damping { scale: 0.3 },
+                drives: drives(0.04),
+            },
         ],
     }
 }

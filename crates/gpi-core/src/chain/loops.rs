@@ -25,7 +25,8 @@
 //!
 //! The forces of Bouc and Wen and of Dahl remember the force and the last two z, and depend on the path of z alone; their steps and the
 //! derivatives of them, which are the marks, are in [`super::bouc_wen`] and [`super::dahl`]. The speed `|z - z_1|` has the sign of
-//! `z - z_1` as its mark. No loop is algebraic: w of one step changes z from the next step on ([`super::between`]).
+//! `z - z_1` as its mark, and damping its derivatives by that change and by its scale. What depends on the speed counts the change in a
+//! sample: that of a step times the number of steps. No loop is algebraic: w of one step changes z from the next step on ([`super::between`]).
 
 use super::between::{Between, Row};
 use super::bouc_wen::{Shape, Step};
@@ -45,6 +46,8 @@ pub(crate) struct Loops<'a> {
     /// The signals of each step of a sample, loops one after the other.
     pub signals: Vec<LoopSignals>,
     w: Vec<f64>,
+    /// Steps in a sample.
+    pace: f64,
 }
 
 /// The signals of one loop in one step: w, its marks, and what the weights of its stops multiply.
@@ -65,6 +68,7 @@ impl<'a> Loops<'a> {
             signals: (0..between.seen.len()).map(rest).collect(),
             places: loops.iter().map(|inner| vec![0.0; inner.law.memories()]).collect(),
             w: vec![0.0; between.seen.len()],
+            pace: (between.seen.len() / loops.len().max(1)) as f64,
             loops,
             between,
         }
@@ -73,7 +77,7 @@ impl<'a> Loops<'a> {
     /// All steps from a sample to the next, from the state of G behind its dead time, v at both samples, and the displacement of what is
     /// in parallel with G.
     pub(crate) fn run(&mut self, state: &[f64], v: &[f64], next: &[f64], beside: &[f64]) {
-        let Self { loops, between, places, signals, w } = self;
+        let Self { loops, between, places, signals, w, pace } = self;
         for (number, (row, own)) in between.seen.iter().zip(signals).enumerate() {
             let inner = number % loops.len();
             let Row { states, inputs, next: ahead, earlier } = row;
@@ -82,7 +86,7 @@ impl<'a> Loops<'a> {
             if let Sees::Output(output) = loops[inner].sees {
                 z += beside[output];
             }
-            own.w = loops[inner].law.step(&mut places[inner], z, &mut own.marks);
+            own.w = loops[inner].law.step(&mut places[inner], z, *pace, &mut own.marks);
             w[number] = own.w;
             for (stop, place) in own.stops.iter_mut().zip(&places[inner]) {
                 *stop = z - place;
@@ -113,8 +117,8 @@ impl Law {
         places
     }
 
-    /// w at z.
-    pub(crate) fn step(&self, places: &mut [f64], z: f64, marks: &mut [f64]) -> f64 {
+    /// w at z, so many steps a sample.
+    pub(crate) fn step(&self, places: &mut [f64], z: f64, pace: f64, marks: &mut [f64]) -> f64 {
         match self {
             Self::Power { exponent, scale } => {
                 let relative = z / scale;
@@ -147,9 +151,16 @@ impl Law {
                 w.value
             }
             Self::Speed => {
-                let change = z - std::mem::replace(&mut places[0], z);
-                marks[0] = if change < 0.0 { -1.0 } else { 1.0 };
+                let change = pace * (z - std::mem::replace(&mut places[0], z));
+                marks[0] = if change < 0.0 { -pace } else { pace };
                 change.abs()
+            }
+            Self::Damping { scale } => {
+                let change = pace * (z - std::mem::replace(&mut places[0], z)) / scale;
+                let part = change.tanh();
+                let slope = 1.0 - part * part;
+                marks.copy_from_slice(&[pace * slope, part - change * slope]);
+                scale * part
             }
         }
     }
@@ -204,6 +215,12 @@ impl Law {
                 add(simd, &mut w, -marks[0], &places[0]);
                 places[0] = z;
             }
+            Self::Damping { .. } => {
+                add(simd, &mut w, marks[0], &z);
+                add(simd, &mut w, -marks[0], &places[0]);
+                add(simd, &mut w, marks[1], &shape[0]);
+                places[0] = z;
+            }
         }
         w
     }
@@ -235,6 +252,11 @@ impl Law {
             Self::Speed => {
                 z += places[0] + marks[0] * w;
                 places[0] = -marks[0] * w;
+            }
+            Self::Damping { .. } => {
+                z += places[0] + marks[0] * w;
+                places[0] = -marks[0] * w;
+                shape[0] += marks[1] * w;
             }
             Self::BoucWen { .. } | Self::Dahl { .. } => {
                 let [of_w, of_f] = self.slopes(marks);

@@ -112,28 +112,34 @@ pub enum Law {
     /// `w(k) = |z(k) - z(k - 1)|`: the speed without its sign. A force in proportion to it is the part of viscous friction by
     /// which the two directions differ.
     Speed,
+    /// `w(k) = scale tanh((z(k) - z(k - 1)) / scale)`: a force that grows with the speed up to a limit. Beside the linear damping in G,
+    /// it is damping that depends on the speed.
+    Damping {
+        /// The change of z in a sample at which the force is near its limit, in the unit of z, positive.
+        scale: f64,
+    },
 }
 
 impl Law {
     /// The number of values that it remembers: the places of the plays of stops; the force and the last two z where it follows the
-    /// path of z; the last z for the speed.
+    /// path of z; the last z where it depends on the speed.
     pub(crate) fn memories(&self) -> usize {
         match self {
             Self::Power { .. } => 0,
             Self::Stops { half_widths, .. } => half_widths.len(),
             Self::BoucWen { .. } | Self::Dahl { .. } => 3,
-            Self::Speed => 1,
+            Self::Speed | Self::Damping { .. } => 1,
         }
     }
 
     /// The number of values to which w does not respond linearly: the half-widths of stops; beta, gamma and the exponent; the
-    /// break-away distance.
+    /// break-away distance; the scale of a damping.
     pub(crate) fn shapes(&self) -> usize {
         match self {
             Self::Power { .. } | Self::Speed => 0,
             Self::Stops { half_widths, .. } => half_widths.len(),
             Self::BoucWen { .. } => 3,
-            Self::Dahl { .. } => 1,
+            Self::Dahl { .. } | Self::Damping { .. } => 1,
         }
     }
 
@@ -151,6 +157,7 @@ impl Law {
     pub(crate) fn marks(&self) -> usize {
         match self {
             Self::Power { .. } | Self::Speed => 1,
+            Self::Damping { .. } => 2,
             Self::Stops { half_widths, .. } => half_widths.len().max(1),
             Self::BoucWen { .. } => 4 + self.shapes(),
             // those of the force that is remembered, too
@@ -249,6 +256,9 @@ impl InnerLoop {
         if drives > states {
             return Some(format!("drives {drives} states, but the dynamics have {states}"));
         }
+        if drives > behind {
+            return Some(format!("drives {drives} states, but {behind} are behind the dead time"));
+        }
         match &self.sees {
             Sees::Output(output) if *output >= outputs => {
                 return Some(format!("sees output {output} of {outputs}"));
@@ -278,6 +288,9 @@ impl InnerLoop {
             }
             Law::Dahl { distance, .. } if distance.is_nan() || *distance <= 0.0 => {
                 Some(format!("has the break-away distance {distance}, but it must be positive"))
+            }
+            Law::Damping { scale } if scale.is_nan() || *scale <= 0.0 => {
+                Some(format!("has the scale {scale} of its damping, but it must be positive"))
             }
             Law::BoucWen { exponent, .. } if exponent.is_nan() || *exponent < 1.0 => {
                 Some(format!("has the exponent {exponent}, but it must be at least 1"))

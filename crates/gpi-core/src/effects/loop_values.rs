@@ -1,7 +1,7 @@
 //! The values of loops around G: what is estimated, in which limits, and what it is called.
 //!
 //! The values of a loop are its column of E, its rows of S and T, and those of its law: the logarithms of the half-widths
-//! of stops and their weights, beta, gamma and the exponent, or the logarithm of a break-away distance. The product of E, the scale of the signal and the scale of w is what the
+//! of stops and their weights, beta, gamma and the exponent, or the logarithm of a break-away distance or of the scale of a damping. The product of E, the scale of the signal and the scale of w is what the
 //! output shows; therefore the largest element of S and T, or the widest half-width and the last weight of stops, are held.
 
 use super::{Block, ClosedLoops, Drives, InnerLoop, Law, Quantity, Sees, SteadyForce, Units};
@@ -53,8 +53,8 @@ fn groups(inner: &mut InnerLoop) -> Vec<Group<'_>> {
     }
     match &mut inner.law {
         Law::Power { .. } | Law::Speed => {}
-        Law::Dahl { distance, .. } => {
-            groups.push(Group::Logarithms(std::slice::from_mut(distance)));
+        Law::Dahl { distance: scale, .. } | Law::Damping { scale } => {
+            groups.push(Group::Logarithms(std::slice::from_mut(scale)));
         }
         Law::Stops { half_widths, weights } => {
             groups.extend([Group::Logarithms(half_widths), Group::Plain(weights)]);
@@ -123,11 +123,12 @@ fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
             bounds.extend([(0.0, f64::INFINITY), (f64::NEG_INFINITY, f64::INFINITY)]);
             bounds.push((1.0, SHARPEST));
         }
-        if let Law::Dahl { distance, .. } = &inner.law {
+        if let Law::Dahl { distance: scale, .. } | Law::Damping { scale } = &inner.law {
             /// The largest step of the logarithm of the break-away distance. By hand: with longer steps it becomes shorter than the motion
-            /// within a sample before the other values have followed, and then it hardly changes the output.
+            /// within a sample before the other values have followed, and then it hardly changes the output. The same holds for the
+            /// scale of a damping.
             const STEP: f64 = 0.5;
-            bounds.push((distance.ln() - STEP, distance.ln() + STEP));
+            bounds.push((scale.ln() - STEP, scale.ln() + STEP));
         }
         if let Law::Stops { half_widths, weights } = &inner.law {
             /// Largest distance of a half-width from the widest one, in logarithms: a factor of a thousand.
@@ -180,6 +181,9 @@ fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
         if let Law::Dahl { distance, .. } = &inner.law {
             found.push(Quantity::new("break_away_distance", units.output, *distance));
         }
+        if let Law::Damping { scale } = &inner.law {
+            found.push(Quantity::new(format!("damping_scale[{q}]"), units.output, *scale));
+        }
         if let Law::BoucWen { beta, gamma, exponent } = &inner.law {
             // z is a displacement
             let unit = match units.output {
@@ -206,7 +210,7 @@ pub(super) fn in_steady_state(
     forces: &dyn Fn(&InnerLoop) -> Option<SteadyForce>,
 ) -> Vec<Quantity> {
     let of = |(q, inner): (usize, &InnerLoop)| {
-        let SteadyForce { over_stiffness: force, of_input, period, .. } = forces(inner)?;
+        let SteadyForce { over_stiffness: force, of_input, period, mechanics } = forces(inner)?;
         let (name, unit, value) = match &inner.law {
             Law::Power { exponent, scale } => {
                 let unit = match (units.output, exponent - 1) {
@@ -223,6 +227,12 @@ pub(super) fn in_steady_state(
             }
             Law::BoucWen { .. } => (format!("hysteretic_over_linear[{q}]"), String::new(), force),
             Law::Dahl { .. } => ("friction_force".to_owned(), units.input.to_owned(), of_input),
+            // w is the speed times the period for slow motion, and k / c of the mode turns it into a part of its damping
+            Law::Damping { .. } => {
+                let [_, damping, stiffness] = mechanics?;
+                let name = "nonlinear_over_linear_damping".to_owned();
+                (name, String::new(), force * period * stiffness / damping)
+            }
             // |dz| is the speed times the period
             Law::Speed => {
                 let unit = per_derivative(units, " s");

@@ -7,6 +7,7 @@
 //!   directions (a square).
 //! - Stops are hysteresis inside the loop: the mechanics become softer and more damped as the amplitude
 //!   grows.
+//! - Beside powers, a force that grows with the speed up to a limit: damping that depends on the amplitude.
 //!
 //! Around several outputs, the signals `S x + T v` are mixtures: of the displacements first, then of what
 //! drives them (see `loop_signals`).
@@ -14,6 +15,7 @@
 use super::loop_signals::{LoopSignal, Shape, families};
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, ClosedLoops, Drives, InnerLoop, Law, Proposal, Sees, Situation, Stage};
+use crate::Matrix;
 
 /// Nonlinear loops around G: `x+ = A x + B v + E w`, `w = law(S x + T v)`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -44,8 +46,14 @@ impl Stiffness {
             return Vec::new();
         }
         if situation.outputs().len() == 1 {
-            let has_powers = situation.loops.iter().any(|inner| !inner.law.has_memory());
-            return if has_powers { Vec::new() } else { powers(situation) };
+            let has = |law: fn(&Law) -> bool| situation.loops.iter().any(|inner| law(&inner.law));
+            let has_powers = has(|law| matches!(law, Law::Power { .. }));
+            let is_damped = has(|law| matches!(law, Law::Damping { .. }));
+            return match (has_powers, is_damped) {
+                (false, _) => powers(situation),
+                (true, false) => damping(situation),
+                (true, true) => Vec::new(),
+            };
         }
         let families = families(situation).into_iter();
         families.flat_map(|(shape, signals)| around(shape, &signals, situation)).collect()
@@ -67,6 +75,28 @@ fn powers(situation: &Situation) -> Vec<Proposal<Stiffness>> {
     };
     let block = Stiffness { loops: [2, 3].map(power).to_vec() };
     [order..2 * order, 0..2 * order].map(|places| Proposal::linear(block.clone(), places)).to_vec()
+}
+
+/// A damping that depends on the speed.
+fn damping(situation: &Situation) -> Vec<Proposal<Stiffness>> {
+    /// The scale over the root mean square of the change in a sample: a limit that each cycle reaches, and one that is hardly reached.
+    const SCALES: [f64; 3] = [0.1, 0.5, 2.0];
+    let order = situation.dynamics.order();
+    let changes = situation.displacements.iter().map(|signal| {
+        let column = signal.column(0);
+        column.iter().zip(column.iter().skip(1)).map(|(a, b)| (b - a).powi(2)).sum::<f64>()
+    });
+    let samples: usize = situation.displacements.iter().map(Matrix::nrows).sum();
+    let rms = (changes.sum::<f64>() / samples as f64).sqrt();
+    let around = |scale: f64| {
+        let inner = InnerLoop {
+            sees: Sees::Output(0),
+            law: Law::Damping { scale: scale * rms },
+            drives: Drives::States(vec![0.0; order]),
+        };
+        Proposal::linear(Stiffness { loops: vec![inner] }, 0..order)
+    };
+    if rms > 0.0 { SCALES.map(around).to_vec() } else { Vec::new() }
 }
 
 /// Loops through these signals.

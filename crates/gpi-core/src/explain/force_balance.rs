@@ -137,7 +137,7 @@ fn runs(record: &Record, delay: usize, laws: &[&Law]) -> Vec<Matrix> {
             for (number, law) in laws.iter().enumerate() {
                 let (mut places, mut marks) = (law.at_rest(y[first]), vec![0.0; law.marks()]);
                 for k in 0..rows {
-                    signals[(k, 2 + number)] = law.step(&mut places, y[first + k], &mut marks);
+                    signals[(k, 2 + number)] = law.step(&mut places, y[first + k], 1.0, &mut marks);
                 }
             }
             signals

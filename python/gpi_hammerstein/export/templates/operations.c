@@ -64,7 +64,7 @@ static real slew(real *drive, real input, real reach)
 }
 
 @end
-@bent|bouc_wen|dahl
+@bent|bouc_wen|dahl|damping
 /* log(1 + x) for x >= 0 */
 static real log_of_one_plus(real x)
 {
@@ -322,11 +322,23 @@ static real dahl(real *memory, real z, real distance, int averaged)
 
 @end
 @speed
-static real speed(real *memory, real z)
+/* The change of z in a sample, without its sign. */
+static real speed(real *memory, real z, real pace)
 {
-    const real change = z - *memory;
+    const real change = pace * (z - *memory);
     *memory = z;
     return change < 0 ? -change : change;
+}
+
+@end
+@damping
+/* A force that grows with the change of z in a sample up to a limit: scale tanh(change / scale). */
+static real damping(real *memory, real z, real scale, real pace)
+{
+    const real change = pace * (z - *memory);
+    const real lost = -exp_less_one((change < 0 ? 2 : -2) * change / scale);
+    *memory = z;
+    return (change < 0 ? -scale : scale) * lost / (2 - lost);
 }
 
 @end

@@ -48,7 +48,7 @@ fn slew(drive: &mut [Real], input: Real, reach: Real) -> Real {
     drive[0]
 }
 @end
-@bent|bouc_wen|dahl
+@bent|bouc_wen|dahl|damping
 
 /// log(1 + x) for x >= 0
 fn log_of_one_plus(x: Real) -> Real {
@@ -273,10 +273,22 @@ fn dahl(memory: &mut [Real], z: Real, distance: Real, averaged: u8) -> Real {
 @end
 @speed
 
-fn speed(memory: &mut [Real], z: Real) -> Real {
-    let change = z - memory[0];
+/// The change of z in a sample, without its sign.
+fn speed(memory: &mut [Real], z: Real, pace: Real) -> Real {
+    let change = pace * (z - memory[0]);
     memory[0] = z;
     change.abs()
+}
+@end
+@damping
+
+/// A force that grows with the change of z in a sample up to a limit: scale tanh(change / scale).
+fn damping(memory: &mut [Real], z: Real, scale: Real, pace: Real) -> Real {
+    let change = pace * (z - memory[0]) / scale;
+    memory[0] = z;
+    let lost = -exp_less_one(-2.0 * change.abs());
+    let force = scale * lost / (2.0 - lost);
+    if change < 0.0 { -force } else { force }
 }
 @end
 @mixture

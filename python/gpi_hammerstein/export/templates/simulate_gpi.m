@@ -265,7 +265,10 @@ function [force, places] = law(own, signal, places)
             end
             places = [friction; signal; before];
         case 'speed'
-            force = abs(signal - places);
+            force = own.pace * abs(signal - places);
+            places = signal;
+        case 'damping'
+            force = own.scale * tanh(own.pace * (signal - places) / own.scale);
             places = signal;
         otherwise
             unknown(own);
