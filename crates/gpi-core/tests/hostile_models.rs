@@ -78,7 +78,7 @@ fn model(effects: &[Value]) -> Value {
         Model::new(100.0, channel("u"), channel("y"), hysteresis, linear, vec![7.0]).unwrap();
     let mut described: Value = serde_json::from_str(&model.to_json().unwrap()).unwrap();
     described["effects"] = effects.to_vec().into();
-    if effects.len() % 2 == 0 {
+    if effects.len().is_multiple_of(2) {
         described["intersample"] = json!({"substeps": 2, "hold": "first"});
     }
     described
