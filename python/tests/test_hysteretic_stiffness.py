@@ -173,7 +173,12 @@ def test_the_physics_of_the_public_benchmark_are_found() -> None:
 
 
 @pytest.mark.parametrize(
-    ("stage", "effect"), [("bouc-wen-spring", "hysteretic-stiffness"), ("dahl", "friction")]
+    ("stage", "effect"),
+    [
+        # the benchmark of the same force is a faster test
+        pytest.param("bouc-wen-spring", "hysteretic-stiffness", marks=pytest.mark.slow),
+        ("dahl", "friction"),
+    ],
 )
 def test_forces_of_other_textbooks_are_named(stage: str, effect: str) -> None:
     record = textbook.draw(stage, 1002)

@@ -88,7 +88,7 @@ impl Model {
     /// let fine = coarse.clone().with_intersample(Intersample { substeps: 8, hold: Hold::Zero })?;
     /// let input = Matrix::from_fn(50, 1, |k, _| f64::from(u8::from(k > 0)));
     /// let difference = coarse.simulate(&input)? - fine.simulate(&input)?;
-    /// assert!(difference.amax() > 0.01 && difference.amax() < 1.0);
+    /// assert!(difference.amax() > 0.01);
     /// # Ok::<(), gpi_core::Error>(())
     /// ```
     ///

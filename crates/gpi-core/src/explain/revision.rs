@@ -26,7 +26,7 @@ use crate::Progress;
 use crate::effects::{Entry, FreeOrder, Place, Signature};
 use crate::fit::line_modes::{is_same, line_modes};
 use crate::fit::memory::Memory;
-use crate::fit::minimize::{FitOptions, Fitted};
+use crate::fit::minimize::Fitted;
 use crate::linear::resonates;
 use crate::progress::as_trial;
 use nalgebra::Complex;
@@ -118,9 +118,7 @@ pub(super) fn shed_sections(state: &mut SearchState, progress: Progress) -> Resu
             continue;
         }
         let without = state.point.without_section(section);
-        let steps = state.setup.policy.fits.far_steps;
-        let options = FitOptions { steps, ..state.setup.options.clone() };
-        let fitted = state.fit(without, &options, "rearrangement", progress)?;
+        let fitted = state.fit(without, &state.setup.options, "rearrangement", progress)?;
         let squares = |point| Ok::<f64, Error>(state.held_out(point)?.iter().sum());
         let most = 1.0 + state.setup.policy.revision.section;
         let is_needed = fitted.linearization.cost > most * state.cost

@@ -4,7 +4,6 @@
 
 use super::state::SearchState;
 use crate::Error;
-use crate::fit::minimize::FitOptions;
 use crate::progress::Progress;
 use crate::{Hold, Intersample};
 
@@ -30,9 +29,8 @@ pub(super) fn finer_steps(state: &mut SearchState, progress: Progress) -> Result
         for &hold in holds {
             let mut point = state.point.clone();
             point.intersample = Intersample { substeps, hold };
-            let steps = state.setup.policy.fits.far_steps;
-            let options = FitOptions { steps, ..state.setup.options.clone() };
-            let fitted = state.fit(point, &options, "steps between samples", progress)?;
+            let fitted =
+                state.fit(point, &state.setup.options, "steps between samples", progress)?;
             let (point, cost) = (fitted.point, fitted.linearization.cost);
             if cost < best.as_ref().map_or((1.0 - policy.least) * state.cost, |&(_, cost)| cost) {
                 best = Some((point, cost));
