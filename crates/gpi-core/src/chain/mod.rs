@@ -5,8 +5,9 @@
 //! ```
 //!
 //! Each place has one forward definition, which users' [`Model`](crate::Model) and the estimator's
-//! [`Point`](point::Point) share: [`stages`] before and after, [`plays`], [`loops`] around the dynamics. The linear
-//! part is the one block that differs: a state space in a model, [`motion`] in sections for a point.
+//! [`Point`](point::Point) share: [`stages`] before and after, [`plays`], [`loops`] around the dynamics, and what they see
+//! [`between`] two samples. The linear part is the one block that differs: a state space in a model ([`circulate`] where it has
+//! loops), [`motion`] in sections for a point.
 //!
 //! For derivatives, let theta be an unknown. It enters the chain at a few places p, where it adds `f_p s_p(k)` per
 //! unit, s_p a signal of the chain ([`injections`]). From there changes run through everything linear behind it:
@@ -47,6 +48,8 @@
 //!
 //! - Derivatives by the values of effects that neither read the plays through curves, nor are sections, nor are loops
 //!   are differences ([`effect_columns`]).
+//! - Derivatives of what loops see and drive by the unknowns of G and of the loops are differences of coefficients, exact to about nine
+//!   digits ([`around_loops`]).
 //! - [`Stream::with_memory`](stream::Stream::with_memory) leaves out what has decayed.
 //! - The steady state before the record contains no loop. Its derivatives by what a loop drives do: they contain
 //!   `(I - A)^-1 w(0)`, which is an error where w(0) is not zero, and decays with the dynamics ([`tangents`]).

@@ -13,7 +13,7 @@
 //! G here is a state space whose dead time is a shift register among the states; a loop sees the v that leaves it. The
 //! estimator's [`super::point::Point`] has the same chain with G in sections and its dead time apart.
 
-use super::between::{Between, Row, held_inputs};
+use super::between::held_inputs;
 use super::hysteresis::Parameters;
 use super::plays::Plays;
 use super::stages::Stages;
@@ -24,7 +24,7 @@ use crate::effects::{
 use crate::linear::advance;
 use crate::model::{Model, ModelState};
 use crate::operators::{GpiState, Operator};
-use crate::{Channel, Error, Intersample, LoopStep, Matrix};
+use crate::{Channel, Error, Matrix};
 use nalgebra::DVector;
 
 impl Model {
@@ -62,77 +62,6 @@ impl Model {
     /// this order; the places themselves have a fixed order.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
-    }
-
-    /// The same model with loops that are computed in other steps between samples, without [`Model::estimates`].
-    ///
-    /// ```
-    /// use gpi_core::effects::{Drives, InnerLoop, Law, Sees, Stiffness};
-    /// use gpi_core::linear::StateSpace;
-    /// use gpi_core::operators::{Deadzones, Gpi, PlayBank, Reading};
-    /// use gpi_core::{Channel, Hold, Intersample, Matrix, Model};
-    /// // a mode of 0.7 rad a sample whose stiffness grows with the displacement
-    /// let a = Matrix::from_row_slice(2, 2, &[1.5, 1.0, -0.98, 0.0]);
-    /// let b = Matrix::from_column_slice(2, 1, &[0.24, 0.24]);
-    /// let linear = StateSpace::new(a, b, Matrix::from_row_slice(1, 2, &[1.0, 0.0]), Matrix::zeros(1, 1))?;
-    /// let envelope = Deadzones::new(vec![0.0], vec![1.0], Reading::OneSided)?;
-    /// let gpi = Gpi::new(envelope, PlayBank::new(vec![0.0], vec![1.0])?);
-    /// let channel = |name| vec![Channel::new(name, "")];
-    /// let model = Model::new(10.0, channel("u"), channel("y"), vec![gpi], linear, vec![0.0])?;
-    /// let cubic = InnerLoop {
-    ///     sees: Sees::Output(0),
-    ///     law: Law::Power { exponent: 3, scale: 1.0 },
-    ///     drives: Drives::States(vec![-0.02, -0.02]),
-    /// };
-    /// let coarse = model.with_effects(vec![Stiffness { loops: vec![cubic] }.into()])?;
-    /// let fine = coarse.clone().with_intersample(Intersample { substeps: 8, hold: Hold::Zero })?;
-    /// let input = Matrix::from_fn(50, 1, |k, _| f64::from(u8::from(k > 0)));
-    /// let difference = coarse.simulate(&input)? - fine.simulate(&input)?;
-    /// assert!(difference.amax() > 0.01);
-    /// # Ok::<(), gpi_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Fewer than one or too many steps, and more than one where a pole of G is zero or negative: there is no motion between samples
-    /// then that leads to those of G.
-    pub fn with_intersample(mut self, intersample: Intersample) -> Result<Self, Error> {
-        self.intersample = intersample;
-        self.estimates = None;
-        self.prediction = None;
-        self.validate_effects()?;
-        Ok(self)
-    }
-
-    /// All loops around G in all steps of a sample, the loops of the first step first.
-    ///
-    /// ```
-    /// use gpi_core::linear::StateSpace;
-    /// use gpi_core::operators::{Deadzones, Gpi, PlayBank, Reading};
-    /// use gpi_core::{Channel, Matrix, Model};
-    /// # let gain = Matrix::from_element(1, 1, 1.0);
-    /// # let linear = StateSpace::new(Matrix::zeros(0, 0), Matrix::zeros(0, 1), Matrix::zeros(1, 0), gain)?;
-    /// # let envelope = Deadzones::new(vec![0.0], vec![1.0], Reading::OneSided)?;
-    /// # let gpi = Gpi::new(envelope, PlayBank::new(vec![0.0], vec![2.0])?);
-    /// let channel = |name| vec![Channel::new(name, "")];
-    /// let model = Model::new(10.0, channel("u"), channel("y"), vec![gpi], linear, vec![0.0])?;
-    /// assert!(model.loop_steps()?.is_empty());
-    /// # Ok::<(), gpi_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Dynamics that have no motion between samples, see [`Model::with_intersample`].
-    pub fn loop_steps(&self) -> Result<Vec<LoopStep>, Error> {
-        let Between { seen, drives } = self.between()?;
-        let step = |(row, drives): (Row, Vec<f64>)| {
-            let Row { states, inputs, next, earlier } = row;
-            LoopStep { states, inputs, next, earlier, drives }
-        };
-        Ok(seen.into_iter().zip(drives).map(step).collect())
-    }
-
-    /// How the loops around G are computed between samples.
-    pub fn intersample(&self) -> Intersample {
-        self.intersample
     }
 
     /// The model without the effects that the input does not drive.

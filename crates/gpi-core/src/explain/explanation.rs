@@ -6,6 +6,7 @@ use super::outside::{Situation, outside};
 use super::residual::{self, ResidualTest};
 use super::setup::SearchSetup;
 use super::state::{Addition, Rejected, SearchState};
+use super::steps;
 use super::verdict::{self, NextExperiment, Verdict};
 use crate::chain::point::Point;
 use crate::effects::Effect;
@@ -169,7 +170,8 @@ pub(super) fn summarise(
         test: (test, &tested_after),
         rivals: &fitted,
     };
-    let answer = outside(&situation, &state.setup.policy.outside)?;
+    let mut answer = outside(&situation, &state.setup.policy.outside)?;
+    answer.notes.extend(steps::in_words(&state.point));
     let verdict = verdict::verdict(is_structured, !answer.reasons.is_empty(), !effects.is_empty());
     let policy = &state.setup.policy.proposal;
     let next = verdict::next_experiment(&rejected, &effects, &tests, verdict, record, policy);

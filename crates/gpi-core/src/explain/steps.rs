@@ -4,6 +4,7 @@
 
 use super::state::SearchState;
 use crate::Error;
+use crate::chain::point::Point;
 use crate::progress::Progress;
 use crate::{Hold, Intersample};
 
@@ -41,4 +42,20 @@ pub(super) fn finer_steps(state: &mut SearchState, progress: Progress) -> Result
         changed = true;
     }
     Ok(changed)
+}
+
+/// How the loops of a model are computed between samples, where the data prefer more than one step.
+pub(super) fn in_words(point: &Point) -> Option<String> {
+    let Intersample { substeps, hold } = point.intersample;
+    let hold = match hold {
+        Hold::Zero => "constant between samples (zero-order hold)",
+        Hold::First => "straight between samples (first-order hold)",
+    };
+    let is_told = substeps > 1 && point.loops().next().is_some();
+    is_told.then(|| {
+        format!(
+            "The forces inside the mechanics are computed in {substeps} steps from one sample to the next, with what drives the mechanics {hold}: \
+             the data prefer this to one step."
+        )
+    })
 }
