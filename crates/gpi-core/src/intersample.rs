@@ -15,10 +15,12 @@ pub enum Hold {
 
 /// How the loops of a model are computed between two samples: in so many steps, at the displacement that G has there.
 ///
-/// A loop feeds back what it saw one step ago. Where the dynamics move far within a sample, one step a sample delays the force of the
-/// loop by too much: a mode of the angular frequency w that is sampled every h has `w h / substeps` radians a step.
+/// With one step a sample, a force acts half a sample late on average. Where the dynamics move far within a sample, that is too
+/// late: a mode of the angular frequency w that is sampled every h has `w h / substeps` radians a step. With more steps,
+/// each begins at its middle.
 ///
-/// The samples of G itself do not depend on it: without loops a model has the same output for any value. Equations: (T13) of docs/theory.md.
+/// The samples of G itself do not depend on it: without loops, a model has the same output for any value. Equations: (T13)
+/// of docs/theory.md.
 ///
 /// ```
 /// use gpi_core::{Hold, Intersample};

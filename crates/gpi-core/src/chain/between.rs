@@ -1,7 +1,7 @@
 //! Loops around G between two samples: what they see, and what they drive; (T13) of docs/theory.md.
 //!
-//! From sample k to the next, the loops are computed in M > 1 steps ([`Intersample`]), m = 0 .. M - 1, each from its middle `s = (m + 1/2)/M`. With
-//! `N = ln A` and the hold of v between samples,
+//! From sample k to the next, the loops are computed in M > 1 steps ([`Intersample`]), m = 0 .. M - 1, each from its
+//! middle `s = (m + 1/2)/M`. With `N = ln A` and the hold of v between samples,
 //!
 //! ```text
 //! x(s) = e^(sN) (x + d v) + s phi_1(sN) g v + s^2 phi_2(sN) g (v+ - v),     phi_1(N) = (e^N - 1)/N,  phi_2(N) = (phi_1(N) - 1)/N
@@ -9,19 +9,23 @@
 //! w_m  = law(z_m),      x+ = A x + B v + sum_m S^(M-1-m) E_s w_m,      E_s = (sum_(j<M) S^j)^-1 E
 //! ```
 //!
-//! c and t are a loop's rows of S and T, or the rows of C and D of the output that it sees. g and d follow from B, so that G has the same samples whatever happens
-//! between them:
+//! c and t are a loop's rows of S and T, or the rows of C and D of the output that it sees. g and d follow from B, so
+//! that G has the same samples whatever happens between them:
 //!
 //! | hold | g | d | v(s) | what is left of t |
 //! |---|---|---|---|---|
 //! | zero | `phi_1(N)^-1 B` | 0 | v | t |
 //! | first | `phi_1(N)^-2 B` | `phi_2(N) g` | `v + s (v+ - v)` | `t - c d` |
 //!
-//! For a first-order hold, x is the state of the continuous system less `d v`: what a change of v within the last sample has moved, which
-//! D contains. E is what a w that stays constant for a sample drives. What w of a step moves until its middle is left out: a force moves a mass by a part of the
-//! square of the step, so that the error of M steps is that of the midpoint rule, proportional to 1/M^2. With one step a sample, loops see the
-//! sample itself, `z = c x + t v`, and `x+ = A x + B v + E w`: half a sample late, which is the price of a v that is known already. A force that enters where an input does drives
-//! `E = -force phi_1(N) g`, what a constant input drives in a sample; at M = 1 that is B.
+//! For a first-order hold, x is the state of the continuous system less `d v`: what a change of v within the last sample
+//! has moved, which D contains. E is what a w that stays constant for a sample drives; a force that enters where an input
+//! does drives `E = -force phi_1(N) g`, which is what a constant input drives.
+//!
+//! What w of a step moves until its middle is left out: a force moves a mass by a part of the square of the step, so that
+//! the error of M steps is that of the midpoint rule, proportional to 1/M^2.
+//!
+//! With one step a sample, loops see the sample itself, `z = c x + t v`, and `x+ = A x + B v + E w`, with E = -force B for
+//! a force that enters where an input does: half a sample late, but v at the next sample is not needed.
 //!
 //! Sections in parallel with G are slow: between samples they stand still.
 
@@ -29,7 +33,8 @@ use crate::effects::{InnerLoop, Sees};
 use crate::linear::{Sections, StateSpace, logarithm};
 use crate::{Hold, Intersample, Matrix};
 
-/// What one loop sees in one step: factors of the states of G at the sample, of v there and at the next sample, and of all w before.
+/// What one loop sees in one step: factors of the states of G at the sample, of v there and at the next sample, and of
+/// all w before.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Row {
     pub states: Vec<f64>,
@@ -69,60 +74,56 @@ impl Between {
         loops: &[&InnerLoop],
         intersample: Intersample,
     ) -> Option<Self> {
-        let steps = intersample.substeps;
-        let inputs = system.inputs();
-        let motion = if steps == 1 { None } else { Some(Motion::new(system, intersample.hold)?) };
-        let b = columns(motion.as_ref().map_or(system.b(), |motion| &motion.held));
-        let mut e = Matrix::zeros(system.order(), loops.len());
-        for (mut column, inner) in e.column_iter_mut().zip(loops) {
-            last(column.as_mut_slice(), &inner.drives.column(&b));
+        if intersample.is_plain() {
+            return Some(Self::at_samples(system, loops));
         }
-        let (c, t) = seen(system, loops);
-        let (moments, step) = match &motion {
-            None => {
-                let next = Matrix::zeros(loops.len(), inputs);
-                (vec![Moment { states: c.clone(), inputs: t, next }], system.a().clone())
-            }
-            Some(motion) => {
-                let middle = |m: usize| (m as f64 + 0.5) / steps as f64;
-                let moments = (0..steps).map(|m| motion.at(middle(m), &c, &t));
-                (moments.collect(), (&motion.logarithm / steps as f64).exp())
-            }
-        };
-        // what the loops see half a step later
-        let half = &c
-            * motion.as_ref().map_or_else(
-                || Matrix::identity(e.nrows(), e.nrows()),
-                |motion| (&motion.logarithm / (2 * steps) as f64).exp(),
-            );
+        let steps = intersample.substeps;
+        let motion = Motion::new(system, intersample.hold)?;
+        let part = |steps: usize| (&motion.logarithm / steps as f64).exp();
+        let (step, half) = (part(steps), part(2 * steps));
+        let identity = Matrix::identity(system.order(), system.order());
         let powers: Vec<Matrix> =
-            std::iter::successors(Some(Matrix::identity(e.nrows(), e.nrows())), |power| {
-                Some(&step * power)
-            })
-            .take(steps)
-            .collect();
-        let over: Matrix = powers.iter().sum();
-        let e = if steps == 1 { e } else { over.lu().solve(&e)? };
-        let responses: Vec<Matrix> = powers.iter().map(|power| power * &e).collect();
+            std::iter::successors(Some(identity), |power| Some(&step * power))
+                .take(steps)
+                .collect();
+        let e = driven(loops, &columns(&motion.held));
+        let of_a_step = powers.iter().sum::<Matrix>().lu().solve(&e)?;
+        let responses: Vec<Matrix> = powers.iter().map(|power| power * &of_a_step).collect();
+        let (c, t) = seen(system, loops);
         let mut between = Self { seen: Vec::new(), drives: Vec::new() };
-        for (m, moment) in moments.iter().enumerate() {
+        for m in 0..steps {
+            let moment = motion.at((m as f64 + 0.5) / steps as f64, &c, &t);
+            // what the loops see of the steps before, half a step after each
+            let earlier: Vec<Matrix> = (0..m).map(|j| &c * &half * &responses[m - j - 1]).collect();
             for number in 0..loops.len() {
-                let row = |matrix: &Matrix| matrix.row(number).iter().copied().collect();
-                let earlier = (0..m).flat_map(|j| {
-                    let passed = half.row(number) * &responses[m - j - 1];
-                    passed.iter().copied().collect::<Vec<f64>>()
-                });
+                let row =
+                    |matrix: &Matrix| -> Vec<f64> { matrix.row(number).iter().copied().collect() };
                 between.seen.push(Row {
                     states: row(&moment.states),
                     inputs: row(&moment.inputs),
                     next: row(&moment.next),
-                    earlier: earlier.collect(),
+                    earlier: earlier.iter().flat_map(row).collect(),
                 });
                 let drive = responses[steps - 1 - m].column(number);
                 between.drives.push(drive.iter().copied().collect());
             }
         }
         Some(between)
+    }
+
+    /// Loops that take one step a sample.
+    fn at_samples(system: &StateSpace, loops: &[&InnerLoop]) -> Self {
+        let (c, t) = seen(system, loops);
+        let row = |number: usize| Row {
+            states: c.row(number).iter().copied().collect(),
+            inputs: t.row(number).iter().copied().collect(),
+            next: vec![0.0; system.inputs()],
+            earlier: Vec::new(),
+        };
+        Self {
+            seen: (0..loops.len()).map(row).collect(),
+            drives: columns(&driven(loops, &columns(system.b()))),
+        }
     }
 
     /// The same form, and nothing is a number.
@@ -146,6 +147,15 @@ pub(crate) fn held_inputs(system: &StateSpace, intersample: Intersample) -> Opti
         return Some(columns(system.b()));
     }
     Some(columns(&Motion::new(system, intersample.hold)?.held))
+}
+
+/// The columns of E, from what a constant input drives in a sample.
+fn driven(loops: &[&InnerLoop], held: &[Vec<f64>]) -> Matrix {
+    let mut e = Matrix::zeros(held.first().map_or(0, Vec::len), loops.len());
+    for (mut column, inner) in e.column_iter_mut().zip(loops) {
+        last(column.as_mut_slice(), &inner.drives.column(held));
+    }
+    e
 }
 
 /// Values for the last states; those before have none.
