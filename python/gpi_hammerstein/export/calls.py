@@ -166,8 +166,6 @@ class Calls:
 
     def keep(self, chain: Chain) -> list[str]:
         """Return the statements that keep what loops need of a sample at the next one: states and v."""
-        if not chain.steps:
-            return []
         size = chain.states + len(chain.inputs)
         return [f"{self.own}memory[{chain.pending + place}] = signals[{place}];" for place in range(size)]
 

@@ -29,9 +29,9 @@
 //! 1'  m = (I - A)^-T l,   xbar += m,   vbar += B' m   at the first sample only
 //! ```
 //!
-//! Several steps a sample go back from the last to the first, and steps 4' and 5' also give what v at the next sample and
-//! the w of earlier steps get. An unknown that adds `f s(k)` at a place p has the gradient `f sum_k s(k) pbar(k)`. The sums of all places with all
-//! signals are the products of two matrices, (places, samples) and (samples, signals), one for each block
+//! Where loops take several steps a sample, 5' and 4' run from the last of them to the first, and 4' also adds to the bars of
+//! v at the next sample and of w in the steps before. An unknown that adds `f s(k)` at a place p has the gradient
+//! `f sum_k s(k) pbar(k)`. The sums of all places with all signals are the products of two matrices, (places, samples) and (samples, signals), one for each block
 //! ([`Back::met`]); the injections of [`super::injections`] then choose from (places, signals). Offsets and effects
 //! whose derivatives are differences do not stream through the chain; their part is `sum_k (dy/dtheta) W e` directly.
 //!

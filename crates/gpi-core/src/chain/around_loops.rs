@@ -1,83 +1,71 @@
 //! How unknowns change what loops see and drive.
 //!
 //! The coefficients of [`Between`] depend on the sections of G, its D, and what each loop sees and drives, by logarithms and
-//! exponentials of A. Their derivatives are central differences, which are exact to about nine digits. Each is a factor of a recorded signal: of the
-//! states, of v, or of an earlier w ([`super::injections`]).
+//! exponentials of A. Their derivatives are central differences. Each is a factor of a recorded signal: of the states, of v,
+//! or of an earlier w ([`super::injections`]).
 
 use super::between::{Between, Row};
+use super::loops::loops_of;
 use super::point::Point;
 use super::table::Group;
-use crate::Intersample;
 use crate::effects::{InnerLoop, Place};
 use crate::linear::Sections;
 
-/// Step of the differences, relative to a value or 1. By hand: rounding and curvature are both about 1e-10 of a coefficient.
+/// Step of the differences, relative to a value or 1. By hand: its square, by which curvature counts, is 1e-10, and rounding
+/// over the step is 1e-11.
 const STEP: f64 = 1e-5;
 
 /// Loops around G, to be changed.
 pub(super) struct AroundLoops<'a> {
     point: &'a Point,
     loops: Vec<InnerLoop>,
-    intersample: Intersample,
 }
 
 impl<'a> AroundLoops<'a> {
     pub(super) fn new(point: &'a Point) -> Self {
-        Self { loops: point.loops().cloned().collect(), intersample: point.intersample, point }
+        Self { loops: point.loops().cloned().collect(), point }
     }
 
-    /// The derivatives by the first unknowns of a group, in order; those that follow change none.
+    /// The derivatives by the unknowns of a group, in order; empty ones where an unknown changes nothing.
     pub(super) fn by(&self, group: Group) -> Vec<Between> {
-        if self.loops.is_empty() {
-            return Vec::new();
-        }
-        let of_dynamics = |value: fn(&mut Sections, Group) -> &mut [f64]| {
-            let mut dynamics = self.point.dynamics.clone();
-            let count = value(&mut dynamics, group).len();
-            let moved = |unknown: usize, step: f64| {
-                let mut dynamics = self.point.dynamics.clone();
-                value(&mut dynamics, group)[unknown] += step;
-                dynamics.hold_gain();
-                Between::of_sections(&dynamics, &self.loops, self.intersample)
-            };
-            let values = value(&mut dynamics, group).to_vec();
-            (0..count)
-                .map(|unknown| difference(values[unknown], |step| moved(unknown, step)))
-                .collect()
-        };
         match group {
-            Group::Denominator { .. }
-            | Group::Numerator { .. }
-            | Group::Observer { .. }
-            | Group::Feedthrough { .. } => of_dynamics(values_of),
+            _ if self.loops.is_empty() => Vec::new(),
             Group::Effect { place } => self.of_loops(place),
-            _ => Vec::new(),
+            _ => self.of_dynamics(group),
         }
     }
 
-    /// By what the loops of an effect see and drive; zero for the values of a law.
+    /// By the values of a group of the dynamics. D follows where the DC gain is held.
+    fn of_dynamics(&self, group: Group) -> Vec<Between> {
+        let values = values_of(&mut self.point.dynamics.clone(), group).to_vec();
+        let by = |(unknown, value): (usize, &f64)| {
+            difference(*value, |step| {
+                let mut dynamics = self.point.dynamics.clone();
+                values_of(&mut dynamics, group)[unknown] += step;
+                dynamics.hold_gain();
+                Between::of_sections(&dynamics, &self.loops, self.point.intersample)
+            })
+        };
+        values.iter().enumerate().map(by).collect()
+    }
+
+    /// By the values of the loops of an effect. Those of a law change nothing here.
     fn of_loops(&self, place: usize) -> Vec<Between> {
         let effects = &self.point.effects;
         let Place::Loops(closed) = effects[place].place() else { return Vec::new() };
-        let before = effects[..place].iter().filter_map(|effect| effect.place().closed_loops());
-        let first: usize = before.map(|other| other.loops().len()).sum();
+        let first = loops_of(&effects[..place]).count();
         let mut found = Vec::new();
         for (number, inner) in (first..).zip(closed.loops()) {
-            let mut values = inner.clone();
-            let linear = values.linear_values_mut().into_iter().map(|own| *own);
-            for (unknown, value) in linear.collect::<Vec<f64>>().into_iter().enumerate() {
+            let values: Vec<f64> =
+                inner.clone().linear_values_mut().into_iter().map(|own| *own).collect();
+            for (unknown, value) in values.into_iter().enumerate() {
                 found.push(difference(value, |step| {
                     let mut loops = self.loops.clone();
                     *loops[number].linear_values_mut()[unknown] += step;
-                    Between::of_sections(&self.point.dynamics, &loops, self.intersample)
+                    Between::of_sections(&self.point.dynamics, &loops, self.point.intersample)
                 }));
             }
-            let nothing = || {
-                let none =
-                    Between::of_sections(&self.point.dynamics, &self.loops, self.intersample);
-                none.combined(&none, |_, _| 0.0)
-            };
-            found.extend((0..inner.law.values()).map(|_| nothing()));
+            found.extend((0..inner.law.values()).map(|_| Between::default()));
         }
         found
     }

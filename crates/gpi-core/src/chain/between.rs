@@ -44,7 +44,7 @@ pub(crate) struct Row {
 }
 
 /// All loops in all steps, those of the first step first.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Between {
     pub seen: Vec<Row>,
     /// What w adds to the states of G at the next sample.
@@ -60,7 +60,7 @@ impl Between {
     ) -> Self {
         let loops: Vec<&InnerLoop> = loops.into_iter().collect();
         if loops.is_empty() {
-            return Self { seen: Vec::new(), drives: Vec::new() };
+            return Self::default();
         }
         let behind = Sections { delay: 0, ..dynamics.clone() };
         let found = behind.to_state_space().ok();
@@ -90,7 +90,7 @@ impl Between {
         let of_a_step = powers.iter().sum::<Matrix>().lu().solve(&e)?;
         let responses: Vec<Matrix> = powers.iter().map(|power| power * &of_a_step).collect();
         let (c, t) = seen(system, loops);
-        let mut between = Self { seen: Vec::new(), drives: Vec::new() };
+        let mut between = Self::default();
         for m in 0..steps {
             let moment = motion.at((m as f64 + 0.5) / steps as f64, &c, &t);
             // what the loops see of the steps before, half a step after each
@@ -256,7 +256,7 @@ mod tests {
     use super::*;
     use crate::chain::circulate::tests::{Plant, simulated};
 
-    /// A mode with a cubic spring and Dahl's friction, sampled every h: exact, with what loops drive in a step of h.
+    /// A mode of one radian a second, sampled every h seconds.
     fn plant(h: f64, hold: Hold) -> Plant {
         let f = Matrix::from_row_slice(2, 2, &[0.0, 1.0, -1.0, -0.4]);
         let [a, constant, ramp] = integrals(&f, h);

@@ -1,13 +1,13 @@
 //! The loops of a model around its state space, a block of samples at a time.
 //!
-//! Loops that look ahead ([`Intersample`](crate::Intersample)) need v at the next sample, so that those of the last sample of a block run at the
-//! first sample of the next one. Until then the last effect with loops remembers, behind what its laws do, the state of G behind its dead time,
-//! v there, and the displacement of what is in parallel with G.
+//! Loops that look ahead ([`Intersample`](crate::Intersample)) need v at the next sample. Those of the last sample of a block
+//! therefore run at the first sample of the next block. Until then the last effect with loops remembers, behind what its
+//! laws do, the state of G behind its dead time, v there, and the displacement of what is in parallel with G.
 
 use super::between::{Between, Row};
-use super::loops::Loops;
+use super::loops::{Loops, loops_of};
 use super::stages::Stages;
-use crate::effects::{ClosedLoops, Effect, InnerLoop, Place};
+use crate::effects::{InnerLoop, Place};
 use crate::linear::StateSpace;
 use crate::{Error, Intersample, LoopStep, Matrix, Model, ModelState};
 use nalgebra::DVector;
@@ -102,9 +102,9 @@ impl Model {
 
     /// The loops around G, from sample to sample.
     pub(super) fn between(&self) -> Result<Between, Error> {
-        let loops = loops_of(self.effects());
+        let loops: Vec<&InnerLoop> = loops_of(self.effects()).collect();
         if loops.is_empty() {
-            return Ok(Between { seen: Vec::new(), drives: Vec::new() });
+            return Ok(Between::default());
         }
         let own = self.linear().behind_dead_time().0;
         Between::new(&own, &loops, self.intersample()).ok_or_else(|| {
@@ -133,7 +133,7 @@ impl Model {
         let linear = self.linear();
         let own = linear.behind_dead_time().0;
         let looks_ahead = self.intersample().looks_ahead();
-        let mut loops = Loops::new(loops_of(self.effects()), self.between()?);
+        let mut loops = Loops::new(loops_of(self.effects()).collect(), self.between()?);
         let stages = Stages { effects: self.effects(), rate: self.rate(), first: 0 };
         let mut closed: Vec<_> = stages.at(&mut state.effects, Place::closed_loops).collect();
         let mut known = closed.iter().flat_map(|(_, memory)| memory.iter().copied());
@@ -189,12 +189,6 @@ fn behind(
     let registers = linear.order() - own.order();
     let late = &state.as_slice()[registers.saturating_sub(v.len())..registers];
     if late.is_empty() { v.as_slice().to_vec() } else { late.to_vec() }
-}
-
-/// All loops around G.
-fn loops_of(effects: &[Effect]) -> Vec<&InnerLoop> {
-    let closed = effects.iter().filter_map(|effect| effect.place().closed_loops());
-    closed.flat_map(ClosedLoops::loops).collect()
 }
 
 #[cfg(test)]

@@ -14,7 +14,8 @@
 //! moved: the dead time brings in v(0) until sample L, while the hysteresis waits.
 //!
 //! What derivatives need of a block of samples is recorded as a [`Trace`]: for each sample one column of [`Signals`]
-//! (1, v and dv/dtheta of every input, the derivatives by the values of curves, the same at the next sample where loops look ahead, x, w and the stops of every loop), the
+//! (1, v and dv/dtheta of every input, the derivatives by the values of curves, the same at the next sample where loops look
+//! ahead, x, w and the stops of every loop in every step), the
 //! marks of the loops and the slopes of the output stage.
 
 use super::injections::{ONE, Signals};

@@ -16,12 +16,13 @@
 //! time of L samples drives G by `v(max(k - L, 0))`.
 
 use super::forward::hats;
+use super::loops::loops_of;
 use super::motion::Motion;
 use super::plays::Plays;
 use super::point::{Past, Point};
 use super::stages::Stages;
 use crate::chain::hysteresis::Parameters;
-use crate::effects::{ClosedLoops, InnerLoop, PlayCurves, Stage};
+use crate::effects::{InnerLoop, PlayCurves, Stage};
 use crate::linear::{Section, Sections};
 use crate::parallel::install;
 use crate::{Error, Experiment, Matrix, Model, Record};
@@ -106,8 +107,7 @@ impl Point {
 
     /// The loops that effects close around G.
     pub(crate) fn loops(&self) -> impl Iterator<Item = &InnerLoop> {
-        let closed = self.effects.iter().filter_map(|effect| effect.place().closed_loops());
-        closed.flat_map(ClosedLoops::loops)
+        loops_of(&self.effects)
     }
 
     /// The curves through which plays are read.

@@ -37,6 +37,7 @@
 
 use super::around_loops::AroundLoops;
 use super::between::Between;
+use super::loops::loops_of;
 use super::point::Point;
 use super::sensitivity::{Columns, Derivatives};
 use super::table::{Group, Table};
@@ -100,14 +101,11 @@ impl Signals {
             point.channels.iter().map(|channel| Columns::new(channel, wanted)).collect();
         let columns = hysteresis.iter().map(|own| take(own.len)).collect();
         let reading = point.play_curves().map(|curves| curves.values().len());
-        let readings = reading.map(&mut take).collect();
-        let hysteresis_len = len - (ONE + 1);
-        let mut take = |count: usize| {
-            len += count;
-            len - count..len
-        };
+        let readings: Vec<Range<usize>> = reading.map(&mut take).collect();
         let looks_ahead = point.loops().next().is_some() && point.intersample.looks_ahead();
-        let ahead = looks_ahead.then(|| take(hysteresis_len).start - (ONE + 1));
+        let once = hysteresis.iter().map(|own| own.len).sum::<usize>()
+            + readings.iter().map(ExactSizeIterator::len).sum::<usize>();
+        let ahead = looks_ahead.then(|| take(once).len());
         let states = take(point.order());
         let mut loops = Vec::new();
         for _ in 0..point.intersample.substeps {
@@ -295,10 +293,8 @@ impl Entries<'_> {
                 }
             }
             Place::Loops(closed) => {
-                let others = before.iter().filter_map(|effect| effect.place().closed_loops());
-                let number: usize = others.map(|other| other.loops().len()).sum();
                 let mut first = unknowns.start;
-                for (inner, number) in closed.loops().iter().zip(number..) {
+                for (inner, number) in closed.loops().iter().zip(loops_of(before).count()..) {
                     first += inner.linear_values();
                     first = self.law(inner, number, first);
                 }

@@ -32,10 +32,16 @@ use super::between::{Between, Row};
 use super::bouc_wen::{Shape, Step};
 use super::dahl::friction;
 use super::lanes::{Lanes, NONE, add};
-use crate::effects::{InnerLoop, Law, Sees};
+use crate::effects::{ClosedLoops, Effect, InnerLoop, Law, Sees};
 use crate::linear::dot;
 use crate::operators::play;
 use pulp::Simd;
+
+/// All loops that effects close around G, in the order of the chain.
+pub(crate) fn loops_of(effects: &[Effect]) -> impl Iterator<Item = &InnerLoop> {
+    let closed = effects.iter().filter_map(|effect| effect.place().closed_loops());
+    closed.flat_map(ClosedLoops::loops)
+}
 
 /// Loops in motion.
 pub(crate) struct Loops<'a> {

@@ -48,8 +48,8 @@
 //!
 //! - Derivatives by the values of effects that neither read the plays through curves, nor are sections, nor are loops
 //!   are differences ([`effect_columns`]).
-//! - Derivatives of what loops see and drive by the unknowns of G and of the loops are differences of coefficients, exact to about nine
-//!   digits ([`around_loops`]).
+//! - Derivatives of what loops see and drive by the unknowns of G and of the loops are differences of coefficients
+//!   ([`around_loops`]).
 //! - [`Stream::with_memory`](stream::Stream::with_memory) leaves out what has decayed.
 //! - The steady state before the record contains no loop. Its derivatives by what a loop drives do: they contain
 //!   `(I - A)^-1 w(0)`, which is an error where w(0) is not zero, and decays with the dynamics ([`tangents`]).

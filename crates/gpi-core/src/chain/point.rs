@@ -214,3 +214,46 @@ fn orders(effect: &Effect, rate: f64) -> Vec<usize> {
     let sections = effect.place().parallel_sections().map(|own| own.sections(rate));
     sections.unwrap_or_default().iter().map(|(a, _)| a.len()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::looped::{model, record, run};
+    use crate::effects::{Drives, Sees};
+    use crate::fit::preparation::Prepared;
+
+    #[test]
+    fn a_section_is_left_out_of_all_that_loops_see_and_drive() {
+        let model = model();
+        let record = record(&model, vec![run(1.5, 0.3, 0, vec![])]);
+        let channels = model.hysteresis().iter().map(Parameters::from_operator).collect();
+        let prepared = Prepared::new(&record, channels).unwrap();
+        let mut point = prepared.point_of(&model).unwrap();
+        point.pasts[0].state = DVector::from_column_slice(&[1.0, 2.0, 3.0]);
+        // a pair and a single pole; they are left out in turn
+        let orders: Vec<usize> = point.dynamics.sections.iter().map(Section::order).collect();
+        assert_eq!(orders, [2, 1]);
+        for (section, left) in [(0, 2..3), (1, 0..2)] {
+            let without = point.without_section(section);
+            let states = &point.pasts[0].state.as_slice()[left.clone()];
+            assert_eq!(without.pasts[0].state.as_slice(), states);
+            for (inner, before) in without.loops().zip(point.loops()) {
+                assert_eq!(inner.drives.states(), left.len());
+                if let (Drives::States(column), Drives::States(whole)) =
+                    (&inner.drives, &before.drives)
+                {
+                    assert_eq!(column[..], whole[left.clone()]);
+                }
+                if let (Sees::Mixture { states, .. }, Sees::Mixture { states: whole, .. }) =
+                    (&inner.sees, &before.sees)
+                {
+                    assert_eq!(states[..], whole[left.clone()]);
+                }
+            }
+            for (input, held) in point.dynamics.held.iter().enumerate() {
+                let (output, gain) = held.unwrap();
+                assert!((without.dynamics.dc_gain()[(output, input)] - gain).abs() < 1e-12);
+            }
+        }
+    }
+}

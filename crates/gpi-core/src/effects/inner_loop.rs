@@ -110,10 +110,10 @@ pub enum Law {
         averaged: bool,
     },
     /// `w(k) = |z(k) - z(k - 1)|`: the speed without its sign. A force in proportion to it is the part of viscous friction by
-    /// which the two directions differ.
+    /// which the two directions differ. With several steps a sample, the change of a step counts times their number.
     Speed,
     /// `w(k) = scale tanh((z(k) - z(k - 1)) / scale)`: a force that grows with the speed up to a limit. Beside the linear damping in G,
-    /// it is damping that depends on the speed.
+    /// it is damping that depends on the speed. Changes count as for the speed.
     Damping {
         /// The change of z in a sample at which the force is near its limit, in the unit of z, positive.
         scale: f64,

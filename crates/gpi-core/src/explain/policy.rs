@@ -110,8 +110,8 @@ settings! {
 
     /// In how many steps loops are computed between samples.
     struct StepsPolicy {
-        /// Twice as many steps are taken where they lower the squares by this part: what is left of the error of a step is a quarter then, or
-        /// nearer to the noise than matters for any decision. By hand.
+        /// Twice as many steps are taken where they lower the squares by this part, 1 % of the error: twice as many leave a quarter
+        /// of what the steps contribute to it. By hand.
         least: f64 = 0.02, PART;
         /// Most steps: a mode at a third of the sampling rate takes an eighth of a radian in one. By hand.
         most: usize = 16, FROM_ONE;
@@ -267,8 +267,8 @@ settings! {
         /// Factor by which the held-out squares may grow without a superfluous effect. The few held-out blocks
         /// vary; the training data decide. By hand.
         superfluous: f64 = 1.5, FROM_ONE;
-        /// Part by which all squares may grow without a section of G that stands beside a mode with a loop: 2.5 % of the error. What explains so little
-        /// far from the noise may stand for anything, and the force of the loop is what it costs. By hand.
+        /// Part by which all squares may grow without a section of G that stands beside a mode with a loop: 2.5 % of the error.
+        /// Far from the noise, what explains so little may stand for anything, and it takes a share of the force. By hand.
         section: f64 = 0.05, PART;
         /// Factor by which the held-out squares may grow when a driven effect replaces a slow function of time. By hand.
         driven_instead: f64 = 1.05, FROM_ONE;

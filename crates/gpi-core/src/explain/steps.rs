@@ -1,6 +1,7 @@
 //! In how many steps loops are computed between two samples, and how v is held meanwhile: what the data prefer.
 //!
-//! Nothing is added to the model, so that less squares on the training samples decide. The steps are doubled as long as that pays.
+//! No parameter is added to the model, so that the squares of the training samples decide. The steps are doubled as long as
+//! these fall.
 
 use super::state::SearchState;
 use crate::Error;
@@ -47,15 +48,15 @@ pub(super) fn finer_steps(state: &mut SearchState, progress: Progress) -> Result
 /// How the loops of a model are computed between samples, where the data prefer more than one step.
 pub(super) fn in_words(point: &Point) -> Option<String> {
     let Intersample { substeps, hold } = point.intersample;
-    let hold = match hold {
-        Hold::Zero => "constant between samples (zero-order hold)",
-        Hold::First => "straight between samples (first-order hold)",
+    let between = match hold {
+        Hold::Zero => "constant (zero-order hold)",
+        Hold::First => "straight (first-order hold)",
     };
     let is_told = substeps > 1 && point.loops().next().is_some();
     is_told.then(|| {
         format!(
-            "The forces inside the mechanics are computed in {substeps} steps from one sample to the next, with what drives the mechanics {hold}: \
-             the data prefer this to one step."
+            "The forces inside the mechanics are computed in {substeps} steps from one sample to the next, because this fits \
+             the data better than one step. Between samples, the signal that drives the mechanics is {between}."
         )
     })
 }

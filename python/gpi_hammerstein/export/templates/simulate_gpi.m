@@ -170,26 +170,29 @@ function y = dynamics(model, v, standing)
         y(:, 1) = y(:, 1) + section(own{1}, deviation, standing(c));
     end
     beside = y;
+    has_steps = ~isempty(model.steps);
     loops = at(model, 'loops');
     places = cellfun(@(own) zeros(own.memory, 1), loops, 'UniformOutput', false);
     x = model.steady * standing(:);
     for k = 1:samples
         now = v(k, :)';
-        if k > 1 && ~isempty(model.steps)
+        if has_steps && k > 1
             [x, places] = settled(model, loops, places, x, now, before, beside(k - 1, :));
         end
         before = [x; now];
         seen = y(k, :)' + model.C * x + model.D * now;
         y(k, :) = seen';
         next = model.A * x + model.B * now;
-        for i = 1:numel(loops) * isempty(model.steps)
-            own = loops{i};
-            signal = seen(own.channel);
-            if isfield(own, 'seen')
-                signal = own.seen(:)' * [x; now];
+        if ~has_steps
+            for i = 1:numel(loops)
+                own = loops{i};
+                signal = seen(own.channel);
+                if isfield(own, 'seen')
+                    signal = own.seen(:)' * [x; now];
+                end
+                [force, places{i}] = law(own, signal, places{i});
+                next = next + own.drives(:) * force;
             end
-            [force, places{i}] = law(own, signal, places{i});
-            next = next + own.drives(:) * force;
         end
         x = next;
     end
