@@ -132,7 +132,14 @@ EFFECTS: dict[str, Schema] = {
         {"output": OUTPUT, "coefficients": numbers(), "middle": number(), "scale": size()}
     ),
     "gain-drift": closed({"output": OUTPUT, **CHANGES}),
-    "backlash": closed({"output": OUTPUT, "half_width": size()}),
+    "backlash": closed(
+        {"output": OUTPUT, "half_width": size()},
+        {
+            "missing": number(
+                "the part of a force's stiffness that is missing while the gap is open", maximum=1
+            )
+        },
+    ),
     "drift": closed({"output": OUTPUT, **CHANGES, "span": size()}, BEFORE_SENSOR),
     "periodic-disturbance": closed(
         {

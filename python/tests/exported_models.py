@@ -184,6 +184,12 @@ def loops_beside_creep() -> Case:
     return Case(model, wander(1000))
 
 
+def force_behind_a_gap() -> Case:
+    """The output is a force that passes a gap."""
+    model = with_effect(with_effects("delay"), name="backlash", output=0, half_width=0.4, missing=0.8)
+    return Case(model, wander(1000))
+
+
 CASES: dict[str, Callable[[], Case]] = {
     "every-effect": every_effect,
     "declared": declared,
@@ -191,6 +197,7 @@ CASES: dict[str, Callable[[], Case]] = {
     "loops-of-two-axes": loops_of_two_axes,
     "loops-between-samples": loops_between_samples,
     "loops-beside-creep": loops_beside_creep,
+    "force-behind-a-gap": force_behind_a_gap,
 }
 
 

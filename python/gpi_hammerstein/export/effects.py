@@ -181,7 +181,10 @@ def gain_drift(own: Parameters, around: Around) -> list[Operation]:
 
 
 def backlash(own: Parameters, around: Around) -> list[Operation]:
-    """(E10): the output follows while the gap is closed."""
+    """(E10): the output follows while the gap is closed; (E18): a force hardly grows while it is open."""
+    if own.get("missing") is not None:
+        numbers = {"half_width": own["half_width"], "missing": own["missing"]}
+        return [Operation("gap", "output", own["output"], numbers)]
     return [Operation("backlash", "output", own["output"], {"half_width": own["half_width"]}, memory=1)]
 
 

@@ -75,6 +75,11 @@ impl Parameters {
         self.slopes[0] * self.weights.iter().sum::<f64>()
     }
 
+    /// The slope of v over u where its direction has just been reversed: no play slides, so that all stops move.
+    pub(crate) fn slope_after_reversal(&self) -> f64 {
+        self.slopes[0] * self.weights[0]
+    }
+
     /// v = Z_0(u) on the given grid: the identity for one-sided deadzones.
     pub(crate) fn identity(
         reading: Reading,

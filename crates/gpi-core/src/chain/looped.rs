@@ -69,7 +69,7 @@ pub(crate) fn model() -> Model {
     let (u, y) = (channels("u"), channels("y"));
     let effects: [Effect; 3] = [
         stiffness().into(),
-        Backlash { output: 1, half_width: 0.2 }.into(),
+        Backlash { output: 1, half_width: 0.2, missing: None }.into(),
         OutputNonlinearity { output: 1, coefficients: vec![0.1, -0.05], middle: 0.1, scale: 3.0 }
             .into(),
     ];

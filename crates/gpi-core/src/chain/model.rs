@@ -109,7 +109,7 @@ impl Model {
     /// # let gpi = Gpi::new(envelope, PlayBank::new(vec![0.0], vec![2.0])?);
     /// let (u, y) = (vec![Channel::new("drive", "V")], vec![Channel::new("position", "um")]);
     /// let model = Model::new(10.0, u, y, vec![gpi], linear, vec![0.0])?;
-    /// let gap: Effect = Backlash { output: 0, half_width: 0.2 }.into();
+    /// let gap: Effect = Backlash { output: 0, half_width: 0.2, missing: None }.into();
     /// let quantities = model.quantities(&gap);
     /// assert_eq!((quantities[0].value, &quantities[0].unit[..]), (0.4, "um"));
     /// # Ok(())
@@ -133,7 +133,11 @@ impl Model {
                 * Parameters::from_operator(&self.hysteresis()[0]).slope();
             Some(SteadyForce::new(over_stiffness, sensitivity, &poles, self.rate()))
         };
-        effect.quantities(Units { input: &input, output: &output }, &force)
+        let gain =
+            self.linear().dc_gain().map_or(f64::NAN, |gain| gain[(place.output().unwrap_or(0), 0)]);
+        let stiffness =
+            gain * Parameters::from_operator(&self.hysteresis()[0]).slope_after_reversal();
+        effect.quantities(Units { input: &input, output: &output, stiffness }, &force)
     }
 
     pub(crate) fn validate_effects(&self) -> Result<(), Error> {

@@ -14,9 +14,11 @@
 //! experiment, so that the other initial states keep their values.
 
 use crate::chain::between::held_inputs;
-use crate::chain::hysteresis::Parameters;
+use crate::chain::hysteresis::{Elements, Parameters};
 use crate::chain::sensitivity::Derivatives;
-use crate::effects::{Coefficients, Effect, InnerLoop, OutputStage, PlaceMut, SteadyForce};
+use crate::effects::{
+    Coefficients, Effect, InnerLoop, OutputKind, OutputStage, PlaceMut, SteadyForce,
+};
 use crate::linear::{Section, Sections};
 use crate::{Intersample, Matrix};
 use nalgebra::DVector;
@@ -201,6 +203,23 @@ impl Point {
         let over_stiffness = inner.relative_force(&b, gains)?;
         let sensitivity = self.dynamics.dc_gain()[(0, 0)] * self.channels[0].slope();
         Some(SteadyForce::new(over_stiffness, sensitivity, &self.dynamics.poles(), self.rate))
+    }
+
+    /// What the output of the hysteresis is, by its elements.
+    pub(crate) fn output_kind(&self) -> OutputKind {
+        let has_stops = |channel: &Parameters| channel.elements == Elements::Stops;
+        if !self.channels.iter().any(has_stops) {
+            OutputKind::Displacement
+        } else if self.channels.iter().all(|own| has_stops(own) && own.thresholds.len() == 1) {
+            OutputKind::Force
+        } else {
+            OutputKind::Other
+        }
+    }
+
+    /// The slope of an output over the first input, where its direction has just been reversed, in steady state.
+    pub(crate) fn stiffness(&self, output: usize) -> f64 {
+        self.dynamics.dc_gain()[(output, 0)] * self.channels[0].slope_after_reversal()
     }
 
     /// The effects of the output stage.

@@ -1,21 +1,40 @@
 //! Mechanical play (backlash) after G.
 //!
-//! `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`, (E10) in the documentation's theory: the output follows the
-//! displacement x only while the gap of width 2 b is closed. It is the play operator of half-width b.
+//! If the output is a displacement, it follows the displacement x only while the gap of width 2 b is closed: (E10) in the
+//! documentation's theory, the play operator of half-width b. If the output is a force that passes the gap, such as that of a friction
+//! damper, the part s of its stiffness is missing while the gap is open: (E18), a dead zone of half-width b.
+//!
+//! ```text
+//! y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))       displacement
+//! y(k) = x(k) - s max(-b, min(b, x(k)))             force
+//! ```
+//!
+//! A force leads the displacement that causes it, and a displacement lags behind its cause: the output is a force where the
+//! hysteresis consists of stops ([`OutputKind`]).
 
 use super::flaws::positive;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
-use super::{Block, Moment, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units};
+use super::{
+    Block, Moment, OutputKind, OutputStage, Proposal, Quantity, Situation, Slope, Stage, Units,
+};
 use crate::operators::play;
 
-/// The output follows only while the gap is closed: `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`.
+/// A gap: a displacement follows only while it is closed, `y(k) = max(x(k) - b, min(x(k) + b, y(k-1)))`, and a force hardly grows while it is open,
+/// `y(k) = x(k) - s max(-b, min(b, x(k)))`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Backlash {
     /// The output behind the gap.
     pub output: usize,
     /// b, half the gap, in the output's unit.
     pub half_width: f64,
+    /// s, the part of the stiffness that is missing while the gap is open, of an output that is a force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing: Option<f64>,
 }
+
+/// s of a proposal, and its bounds. At the lower one, there is hardly a gap.
+const MISSING: f64 = 0.8;
+const LEAST_MISSING: f64 = 0.01;
 
 impl Backlash {
     pub(super) const NAME: &'static str = "backlash";
@@ -32,14 +51,19 @@ impl Backlash {
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
     pub(super) const IS_EXPANSION: bool = false;
 
-    /// Half-widths between a ten-thousandth and a fifth of the span.
+    /// Half-widths between a ten-thousandth and a fifth of the span, or between a hundredth and two fifths of that of a force.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const COUNT: usize = 12;
+        let (missing, least, most): (_, f64, f64) = match situation.kind {
+            OutputKind::Displacement => (None, 1e-4, 0.2),
+            OutputKind::Force => (Some(MISSING), 1e-2, 0.4),
+            OutputKind::Other => return Vec::new(),
+        };
         let blocks = |output| {
             let span = situation.span(output);
             (0..COUNT).map(move |i| {
-                let fraction = 1e-4 * 2000.0_f64.powf(i as f64 / (COUNT - 1) as f64);
-                Proposal::finite(Self { output, half_width: fraction * span })
+                let fraction = least * (most / least).powf(i as f64 / (COUNT - 1) as f64);
+                Proposal::finite(Self { output, half_width: fraction * span, missing })
             })
         };
         situation.outputs().flat_map(blocks).collect()
@@ -48,27 +72,40 @@ impl Backlash {
 
 impl Block for Backlash {
     fn values(&self) -> Vec<f64> {
-        vec![self.half_width]
+        [self.half_width].into_iter().chain(self.missing).collect()
     }
 
     fn set(&mut self, values: &[f64]) {
         self.half_width = values[0];
+        self.missing = values.get(1).copied();
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {
-        vec![(0.3 * self.half_width, 3.0 * self.half_width)]
+        let half_width = (0.3 * self.half_width, 3.0 * self.half_width);
+        [half_width].into_iter().chain(self.missing.map(|_| (LEAST_MISSING, 1.0))).collect()
     }
 
     fn steps(&self) -> Vec<f64> {
-        vec![1e-5 * self.half_width]
+        [1e-5 * self.half_width].into_iter().chain(self.missing.map(|_| 1e-5)).collect()
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
-        vec![Quantity::strength("gap", units.output, 2.0 * self.half_width)]
+        let gap = 2.0 * self.half_width;
+        match self.missing {
+            None => vec![Quantity::strength("gap", units.output, gap)],
+            Some(missing) => vec![
+                Quantity::strength("gap", units.input, gap / units.stiffness),
+                Quantity::strength("missing_stiffness", "", missing),
+            ],
+        }
     }
 
     fn flaw(&self) -> Option<String> {
-        positive(&[("half_width", self.half_width)])
+        let part = |missing: &f64| !(*missing > 0.0 && *missing <= 1.0);
+        positive(&[("half_width", self.half_width)]).or_else(|| {
+            let missing = self.missing.filter(part)?;
+            Some(format!("its part of the stiffness that is missing, {missing}, must be above 0 and at most 1"))
+        })
     }
 }
 
@@ -77,15 +114,45 @@ impl OutputStage for Backlash {
         self.output
     }
 
-    /// The latest output; at first the end of the gap that is nearest to zero.
+    /// The latest output; at first the end of the gap that is nearest to zero. A force remembers nothing.
     fn rest(&self, first: f64) -> Vec<f64> {
-        vec![play(self.half_width, first, 0.0)]
+        match self.missing {
+            None => vec![play(self.half_width, first, 0.0)],
+            Some(_) => Vec::new(),
+        }
+    }
+
+    fn is_pinched(&self) -> bool {
+        self.missing.is_some()
     }
 
     fn sense(&self, state: &mut [f64], output: f64, _: Moment) -> (f64, Slope) {
-        let before = state[0];
-        state[0] = play(self.half_width, output, before);
-        let slope = if state[0] == before { Slope::Held } else { Slope::Times(1.0) };
-        (state[0], slope)
+        let Some(missing) = self.missing else {
+            let before = state[0];
+            state[0] = play(self.half_width, output, before);
+            let slope = if state[0] == before { Slope::Held } else { Slope::Times(1.0) };
+            return (state[0], slope);
+        };
+        let inside = output.clamp(-self.half_width, self.half_width);
+        let slope = if inside == output { 1.0 - missing } else { 1.0 };
+        (output - missing * inside, Slope::Times(slope))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_force_lacks_a_part_of_its_stiffness_while_the_gap_is_open() {
+        let own = Backlash { output: 0, half_width: 0.5, missing: Some(0.75) };
+        let moment = Moment { time: 0.0, rate: 1.0, covariates: &[] };
+        let sense = |force: f64| own.sense(&mut own.rest(force), force, moment);
+        assert_eq!(sense(0.25), (0.0625, Slope::Times(0.25)));
+        assert_eq!(sense(2.0), (2.0 - 0.375, Slope::Times(1.0)));
+        assert_eq!(sense(-2.0), (-2.0 + 0.375, Slope::Times(1.0)));
+        let units = Units { input: "mm", output: "N", stiffness: 4.0 };
+        let [gap, missing] = &own.quantities(units)[..] else { panic!() };
+        assert_eq!((gap.value, &gap.unit[..], missing.value), (0.25, "mm", 0.75));
     }
 }

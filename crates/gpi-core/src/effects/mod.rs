@@ -33,7 +33,7 @@ pub use steady_force::SteadyForce;
 pub(crate) use creep::longest_lag;
 pub(crate) use names::entries;
 pub(crate) use proposal::Proposal;
-pub(crate) use situation::Situation;
+pub(crate) use situation::{OutputKind, Situation};
 
 /// Declares the module of each effect, [`Effect`] with one variant an effect, and [`CATALOGUE`].
 macro_rules! catalogue {
@@ -295,6 +295,7 @@ mod tests {
             residuals: &signals,
             dynamics: &Sections { sections: vec![mode], ..Sections::default() },
             loops: Vec::new(),
+            kind: OutputKind::Displacement,
             widest: vec![0.5],
             places: vec![(-1.0, 1.0)],
         });

@@ -87,7 +87,7 @@ fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
     let n = residual.nrows();
     let power = power(residual.column(output).as_slice());
     let driven = driven(situation, place, output);
-    let is_driven = |line: usize| driven.as_ref().is_some_and(|most| most[line] > power[line]);
+    let is_driven = |line: usize| driven[line] > power[line];
     let mut best: Option<(f64, usize)> = None;
     let mut first = FEWEST_PERIODS;
     // the median of a piece estimates its background
@@ -108,26 +108,37 @@ fn outstanding(situation: &Situation, output: usize) -> Option<f64> {
     Some(peak(&power, line) * situation.record.rate() / n as f64)
 }
 
-/// The power that an error of the model may have at each line, where the only input has most of its power in
-/// one line (a sine, a triangle). A weaker line is no evidence of a disturbance.
-fn driven(situation: &Situation, experiment: usize, output: usize) -> Option<Vec<f64>> {
+/// The power that an error of the model may have at each line. A weaker line is no evidence of a disturbance.
+///
+/// An error of the model is strong where the displacement is. If the only input has most of its power in one line (a sine, a
+/// triangle), it is also strong at the harmonics.
+fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
     /// The n-th harmonic of an error of the model is at most this over n of the displacement's fundamental.
     const MISFIT: f64 = 0.02;
     /// Smallest part of the input's power in its strongest line.
     const MOST: f64 = 0.9;
-    let [drive] = situation.drives[experiment].column_iter().collect::<Vec<_>>()[..] else {
-        return None;
-    };
-    let strongest = Strongest::of(&power(drive.as_slice())).filter(|line| line.part > MOST)?;
-    let displacement = power(situation.displacements[experiment].column(output).as_slice());
+    /// The error of the model over the displacement at a line, over the same for the whole signals, at most.
+    const CONCENTRATED: f64 = 3.0;
+    let displacement = situation.displacements[experiment].column(output);
+    let residual = situation.residuals[experiment].column(output);
+    let ratio = CONCENTRATED * (residual.variance() / displacement.variance()).sqrt();
+    let displacement = power(displacement.as_slice());
     let count = displacement.len();
-    let largest = displacement[near(strongest.place, count)].iter().copied().fold(0.0, f64::max);
-    let mut most = vec![0.0; count];
-    for n in 1..=(count as f64 / strongest.place) as usize {
-        let harmonic = near(n as f64 * strongest.place, count);
-        most[harmonic].fill(largest * (MISFIT / n as f64).powi(2));
+    let largest = |place: f64| displacement[near(place, count)].iter().copied().fold(0.0, f64::max);
+    let part = ratio.clamp(0.0, 1.0).powi(2);
+    let mut most: Vec<f64> = (0..count).map(|line| part * largest(line as f64)).collect();
+    if let [drive] = situation.drives[experiment].column_iter().collect::<Vec<_>>()[..]
+        && let Some(line) = Strongest::of(&power(drive.as_slice())).filter(|line| line.part > MOST)
+    {
+        let fundamental = largest(line.place);
+        for n in 1..=(count as f64 / line.place) as usize {
+            let misfit = fundamental * (MISFIT / n as f64).powi(2);
+            for line in near(n as f64 * line.place, count) {
+                most[line] = most[line].max(misfit);
+            }
+        }
     }
-    Some(most)
+    most
 }
 
 impl Block for PeriodicDisturbance {
@@ -201,6 +212,53 @@ impl Added for PeriodicDisturbance {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::OutputKind;
+    use crate::linear::Sections;
+    use crate::{Channel, Experiment, Matrix, Record};
+    use std::f64::consts::TAU;
+
+    /// The frequency of the line that is proposed where the displacement is a sine of 3 Hz and a weaker one of 7 Hz, both of changing
+    /// size, and the residual is white noise with a sine of some frequency and amplitude.
+    fn proposed(frequency: f64, amplitude: f64) -> f64 {
+        let (rate, n) = (200.0, 6000);
+        let time = |k: usize| k as f64 / rate;
+        let mut random = 11.0;
+        let mut noise = || {
+            random = (random * 16807.0) % 2_147_483_647.0;
+            random / 2_147_483_647.0 - 0.5
+        };
+        let size = |k: usize| 1.0 + 0.3 * (TAU * 0.08 * time(k)).sin();
+        let sines = |k: usize| (TAU * 3.0 * time(k)).sin() + 0.4 * (TAU * 7.0 * time(k)).sin();
+        let u = Matrix::from_fn(n, 1, |k, _| size(k) * sines(k));
+        let line = |k: usize| amplitude * (TAU * frequency * time(k)).sin();
+        let residuals = [Matrix::from_fn(n, 1, |k, _| line(k) + 0.02 * noise())];
+        let channel = |name| vec![Channel::new(name, "")];
+        let run = vec![Experiment::new(u.clone(), u.clone())];
+        let record = Record::new(run, rate, channel("u"), channel("y"), vec![]).unwrap();
+        let signals = [u];
+        let found = PeriodicDisturbance::proposals(&Situation {
+            record: &record,
+            drives: &signals,
+            intermediates: &signals,
+            displacements: &signals,
+            residuals: &residuals,
+            dynamics: &Sections::default(),
+            loops: Vec::new(),
+            kind: OutputKind::Displacement,
+            widest: vec![0.0],
+            places: vec![(-1.0, 1.0)],
+        });
+        found[0].block.frequency
+    }
+
+    #[test]
+    fn an_error_where_the_displacement_is_strong_is_no_disturbance() {
+        // the same error beside the lines of the displacement, and at one of them
+        assert!((proposed(11.3, 0.1) - 11.3).abs() < 0.01);
+        assert!((proposed(3.0, 0.1) - 3.0).abs() > 0.1);
+        // far more than the error that the rest has
+        assert!((proposed(7.0, 0.5) - 7.0).abs() < 0.01);
+    }
 
     #[test]
     fn turning_the_phase_is_as_exact_as_its_sine() {

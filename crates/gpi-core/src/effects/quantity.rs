@@ -24,13 +24,16 @@ impl Quantity {
     }
 }
 
-/// The units of an effect's input and output channels.
+/// The units of an effect's input and output channels, and how one is converted into the other.
 #[derive(Clone, Copy, Debug)]
 pub struct Units<'a> {
     /// The input's.
     pub input: &'a str,
     /// The output's.
     pub output: &'a str,
+    /// The change of the output with the input when its direction has just been reversed, in steady state: the stiffness of
+    /// stops that all move.
+    pub stiffness: f64,
 }
 
 impl Units<'_> {

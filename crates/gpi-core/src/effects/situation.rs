@@ -4,6 +4,17 @@ use super::inner_loop::InnerLoop;
 use crate::linear::Sections;
 use crate::{Matrix, Record};
 
+/// What comes out of the hysteresis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum OutputKind {
+    /// A displacement, which lags behind its cause: plays.
+    Displacement,
+    /// The force of elements that slip, which leads the displacement that causes it: stops without deadzones.
+    Force,
+    /// Stops behind deadzones: a field that saturates, for example.
+    Other,
+}
+
 /// A base model on its record: `u -> drive -> v -> displacement`, one matrix an experiment.
 pub(crate) struct Situation<'a> {
     pub record: &'a Record,
@@ -19,6 +30,8 @@ pub(crate) struct Situation<'a> {
     pub dynamics: &'a Sections,
     /// Loops that are closed around it.
     pub loops: Vec<&'a InnerLoop>,
+    /// What the output of the hysteresis is.
+    pub kind: OutputKind,
     /// Half-width of the widest play of each input.
     pub widest: Vec<f64>,
     /// The range of the plays' input, one an input.

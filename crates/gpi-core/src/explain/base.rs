@@ -123,6 +123,7 @@ impl<'a> Base<'a> {
             residuals: &self.residuals,
             dynamics: &self.point.dynamics,
             loops: self.point.loops().collect(),
+            kind: self.point.output_kind(),
             widest: widest.collect(),
         })
     }

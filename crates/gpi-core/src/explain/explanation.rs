@@ -5,6 +5,7 @@ use super::noise;
 use super::outside::{Situation, outside};
 use super::residual::{self, ResidualTest};
 use super::setup::SearchSetup;
+use super::slip;
 use super::state::{Addition, Rejected, SearchState};
 use super::steps;
 use super::verdict::{self, NextExperiment, Verdict};
@@ -172,6 +173,7 @@ pub(super) fn summarise(
     };
     let mut answer = outside(&situation, &state.setup.policy.outside)?;
     answer.notes.extend(steps::in_words(&state.point));
+    answer.notes.extend(slip::in_words(&state.point, record));
     let verdict = verdict::verdict(is_structured, !answer.reasons.is_empty(), !effects.is_empty());
     let policy = &state.setup.policy.proposal;
     let next = verdict::next_experiment(&rejected, &effects, &tests, verdict, record, policy);

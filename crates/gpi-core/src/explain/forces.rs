@@ -10,7 +10,7 @@ use super::ranking::Ranked;
 use super::score::Score;
 use super::state::{SearchState, Trial};
 use crate::chain::point::{DynamicsFreedom, Point};
-use crate::effects::{Drives, Effect, Entry, PlaceMut, Proposal, Situation, Stage};
+use crate::effects::{Drives, Effect, Entry, OutputKind, PlaceMut, Proposal, Situation, Stage};
 use crate::fit::preparation::rescale;
 use crate::linear::Sections;
 use crate::progress::Progress;
@@ -159,6 +159,7 @@ fn proposals(state: &SearchState, dynamics: &Sections, entry: &Entry) -> Vec<Pro
         residuals: &outputs,
         dynamics,
         loops: Vec::new(),
+        kind: OutputKind::Displacement,
         widest: vec![0.0],
         places: vec![Situation::range(&inputs, 0)],
     })

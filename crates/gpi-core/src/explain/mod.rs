@@ -39,11 +39,13 @@ mod revision;
 mod score;
 mod search;
 mod setup;
+mod slip;
 mod state;
 mod steps;
 mod trial;
 mod verdict;
 
+use crate::effects::OutputKind;
 use crate::fit::RefineOptions;
 use crate::fit::joint::{Refined, fit_options};
 use crate::fit::preparation::starts_at_rest;
@@ -124,8 +126,12 @@ pub fn explain(
     let order_is_given = identify.order.is_some() || identify.delay.is_some();
     // none at all is a grid too
     let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_) | Grid::Count(0)));
+    // a bank of stops that has no deadzones gets none later
+    let is_straight = prepared.channels.iter().all(|channel| channel.thresholds.len() == 1);
+    let is_held =
+        quick.fewer[1] && is_straight && refined.fitted.point.output_kind() == OutputKind::Force;
     let moving = RefineOptions {
-        thresholds: !given(&identify.thresholds),
+        thresholds: !(is_held || given(&identify.thresholds)),
         half_widths: !given(&identify.half_widths),
         ..RefineOptions::default()
     };

@@ -251,6 +251,9 @@ settings! {
         /// from the noise. On records of known truth false ones left 0.10 to 0.6, true forces of one element at most 0.042; sums
         /// of elements left up to 0.4 and are then not named.
         left: f64 = 0.05, PART;
+        /// The same of a gap that a force passes. By hand: a bank of stops with positive weights cannot follow a gap, so that
+        /// most of the squares are the gap's.
+        left_by_gap: f64 = 0.5, PART;
         /// Part by which the squares must fall for the model without a refused effect to be taken instead of the present one:
         /// that of a finer grid that goes on.
         better: f64 = 0.02, PART;

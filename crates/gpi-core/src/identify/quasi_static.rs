@@ -1,6 +1,5 @@
 //! Hysteresis before a gain with a delay, where the order of persistent excitation allows no more.
 
-use crate::Error;
 use crate::chain::point::{DynamicsFreedom, Point};
 use crate::fit::RefineOptions;
 use crate::fit::joint::fit_options;
@@ -10,6 +9,12 @@ use crate::identify::identification::Round;
 use crate::identify::settings::QuasiStaticPolicy;
 use crate::linear::{self, Sections};
 use crate::progress::{Progress, report};
+use crate::{Error, Matrix};
+
+/// The least squares gain from all inputs to all outputs.
+pub(super) fn gain(prepared: &Prepared) -> Result<Matrix, Error> {
+    Ok(linear::estimate(&prepared.record.pieces(0)?, 1, 0.0)?.markov.remove(0))
+}
 
 /// The linear part is a gain of plus or minus one with the delay that fits best, and with one sample
 /// less and more.
@@ -24,7 +29,7 @@ pub(crate) fn seeds(
         let requirement = format!("at most {longest_given} samples; shift the output instead");
         return Err(Error::parameter("delay", delay, requirement));
     }
-    let gain = linear::estimate(&prepared.record.pieces(0)?, 1, 0.0)?.markov.remove(0);
+    let gain = gain(prepared)?;
     let delays = delay.map_or(0..=longest, |delay| delay..=delay);
     let mut options = fit_options(prepared, &RefineOptions::default(), steps);
     options.freedom.identity = false;

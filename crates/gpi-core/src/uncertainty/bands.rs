@@ -68,10 +68,12 @@ impl Bands {
 
     /// Standard deviations of the quantities of every effect.
     pub(crate) fn effect_deviations(&self) -> Result<Vec<Vec<f64>>, Error> {
-        let units = Units { input: "", output: "" };
         let quantities = |point: &Point| -> Vec<Vec<f64>> {
             let force = |inner: &InnerLoop| point.steady_force(inner);
             let of = |effect: &Effect| {
+                let output = effect.place().output().unwrap_or(0);
+                let stiffness = point.stiffness(output);
+                let units = Units { input: "", output: "", stiffness };
                 effect.quantities(units, &force).iter().map(|q| q.value).collect()
             };
             point.blocks().iter().map(of).collect()

@@ -407,6 +407,14 @@ static real backlash(real *place, real y, real half_width)
 }
 
 @end
+@gap
+static real gap(real y, real half_width, real missing)
+{
+    const real inside = y > half_width ? half_width : y < -half_width ? -half_width : y;
+    return y - missing * inside;
+}
+
+@end
 @sinusoid
 /* The phase is counted in turns. Its second number holds what the first one cannot. */
 static real sinusoid(real *phase, real turns, real rest, real cosine, real sine)

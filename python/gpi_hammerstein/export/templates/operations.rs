@@ -349,6 +349,12 @@ fn backlash(place: &mut [Real], y: Real, half_width: Real) -> Real {
     place[0]
 }
 @end
+@gap
+
+fn gap(y: Real, half_width: Real, missing: Real) -> Real {
+    y - missing * y.clamp(-half_width, half_width)
+}
+@end
 @sinusoid
 
 /// The phase is counted in turns. Its second number holds what the first one cannot.

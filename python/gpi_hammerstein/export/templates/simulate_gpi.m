@@ -353,6 +353,8 @@ function y = reading(own, y, covariates)
                 place = max(y(i) - own.half_width, min(y(i) + own.half_width, place));
                 y(i) = place;
             end
+        case 'gap'
+            y = y - own.missing * max(-own.half_width, min(own.half_width, y));
         case 'at_knots'
             y = y + at_knots(own, k);
         case 'sinusoid'

@@ -34,6 +34,12 @@ pub trait OutputStage: Block + Sync {
 
     /// The reading for one sample of the displacement, and how changes pass.
     fn sense(&self, state: &mut [f64], displacement: f64, moment: Moment) -> (f64, Slope);
+
+    /// Whether it makes the output steeper after a part that is flatter, when the direction has been reversed. No bank of stops with
+    /// positive weights does that, so that a misfit of the hysteresis resembles it less than others.
+    fn is_pinched(&self) -> bool {
+        false
+    }
 }
 
 /// A signal that does not depend on the input.

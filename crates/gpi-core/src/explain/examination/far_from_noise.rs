@@ -11,7 +11,7 @@
 //!
 //! - half-widths of plays that depend on speed, because they correct a hysteresis that is itself wrong;
 //! - effects of the output stage, such as a sensor's curve, because they depend on the position, as every misfit of the
-//!   hysteresis does;
+//!   hysteresis does, unless it is a gap that a force passes which leaves no more than a part of the squares of the best model without it;
 //! - a limit of the input's speed that the input exceeds a few times only, because such a limit explains any error of the
 //!   response to a jump, whatever its cause;
 //! - a loop around dynamics whose output integrates the input, because it makes up for the integrator that G lacks, unless it leaves no more
@@ -60,6 +60,11 @@ pub(super) fn doubt(
         Ok(None)
     } else if exceedances(&of, &state.prepared.record).is_some_and(|n| n < policy.exceedances) {
         Ok(Some(Refusal::TooRare))
+    } else if let Place::Output(own) = of
+        && own.is_pinched()
+    {
+        let is_weak = state.cost > policy.left_by_gap * state.best_without(place, progress)?.1;
+        Ok(is_weak.then_some(Refusal::ResemblesMisfit))
     } else if matches!(of, Place::Widths(_) | Place::Output(_)) {
         Ok(Some(Refusal::ResemblesMisfit))
     } else if let Place::Loops(own) = of {
