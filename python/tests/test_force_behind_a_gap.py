@@ -32,7 +32,7 @@ def stop(u, half_width):
 
 
 def behind_a_gap(u, random):
-    """An elastic part of 10 N/mm with a gap, before an element that slips: the force, the gap, the friction force."""
+    """An elastic part with a gap, before an element that slips: the force, the gap, the friction force."""
     reach = random.uniform(0.1, 0.3)
     half = random.uniform(0.2, 0.5) * reach
     x = stop(u, reach + half)
@@ -100,7 +100,7 @@ def test_no_gap_is_named_where_there_is_none(kind, seed):
 
 
 def test_stops_are_found_where_the_dynamics_of_plays_lead_nowhere():
-    """Dry friction hardly depends on the displacement: the best plays and their dynamics are no start for it."""
+    """Dry friction hardly depends on the displacement: the best plays are no start for it."""
     random = np.random.default_rng(7)
     u = displacement(random, 3000)
     model = gpi.identify(measured(u, 10 * stop(u, 0.03), random))

@@ -122,9 +122,15 @@ impl Point {
                 };
                 values.iter().enumerate().map(limits).collect()
             }
+            Group::Thresholds { input } if self.channels[input].prior.slopes > 0.0 => {
+                vec![HELD; values.len()]
+            }
             Group::Thresholds { input } => {
                 let visited = Path::of(record, input).visited(SHOWN);
                 thresholds(&values, range(record, input), visited)
+            }
+            Group::HalfWidths { input } if self.channels[input].prior.weights > 0.0 => {
+                vec![HELD; values.len()]
             }
             Group::HalfWidths { input } => {
                 // the widest play that moves sets the scale of z, where the identity does not

@@ -18,6 +18,7 @@
 //! v.
 
 use super::plays::Plays;
+use super::prior::Prior;
 use crate::effects::{Effect, PlayCurves};
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
 use crate::{Hysteresis, Matrix};
@@ -67,6 +68,8 @@ pub(crate) struct Parameters {
     pub slopes: Vec<f64>,
     pub half_widths: Vec<f64>,
     pub weights: Vec<f64>,
+    /// What is known of the weights and slopes without the data. Half-widths and thresholds with such a prior are held.
+    pub prior: Prior,
 }
 
 impl Parameters {
@@ -93,8 +96,8 @@ impl Parameters {
             values
         };
         let (slopes, weights) = (first(thresholds.len()), first(half_widths.len()));
-        let elements = Elements::default();
-        Self { elements, reading, thresholds, slopes, half_widths, weights }
+        let (elements, prior) = (Elements::default(), Prior::default());
+        Self { elements, reading, thresholds, slopes, half_widths, weights, prior }
     }
 
     /// The parameters of an operator; the identity and the play of half-width zero are added where
@@ -113,7 +116,8 @@ impl Parameters {
         let (half_widths, weights): (Vec<f64>, Vec<f64>) =
             with_zero(plays.half_widths(), plays.weights());
         let elements = Elements::of(&half_widths, &weights);
-        Self { elements, reading: envelope.reading(), thresholds, slopes, half_widths, weights }
+        let (reading, prior) = (envelope.reading(), Prior::default());
+        Self { elements, reading, thresholds, slopes, half_widths, weights, prior }
     }
 
     /// z for one sample of u.

@@ -82,6 +82,7 @@ mod numbers;
 mod placement;
 mod plays;
 pub(crate) mod point;
+pub(crate) mod prior;
 mod sensing;
 pub(crate) mod sensitivity;
 mod stages;

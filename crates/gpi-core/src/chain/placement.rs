@@ -77,8 +77,11 @@ impl Point {
                 }
             }
             let used = |place: &usize, weights: &[f64]| *place == 0 || weights[*place] != 0.0;
-            let plays: Vec<usize> =
-                (0..channel.weights.len()).filter(|i| used(i, &channel.weights)).collect();
+            // the second differences of a smooth density need its whole grid
+            let is_smooth = channel.prior.weights > 0.0;
+            let plays: Vec<usize> = (0..channel.weights.len())
+                .filter(|i| is_smooth || used(i, &channel.weights))
+                .collect();
             let zones: Vec<usize> =
                 (0..channel.slopes.len()).filter(|j| used(j, &channel.slopes)).collect();
             dropped |= plays.len() < channel.weights.len() || zones.len() < channel.slopes.len();
@@ -106,7 +109,8 @@ impl Point {
     pub(crate) fn put_idle_plays(&mut self, sides: &[f64], limits: Option<&[f64]>) -> usize {
         let mut moved = 0;
         for (input, channel) in self.channels.iter_mut().enumerate() {
-            let is_idle = |&i: &usize| i > 0 && channel.weights[i] == 0.0;
+            let is_smooth = channel.prior.weights > 0.0;
+            let is_idle = |&i: &usize| i > 0 && channel.weights[i] == 0.0 && !is_smooth;
             let idle: Vec<usize> = (0..channel.weights.len()).filter(is_idle).collect();
             moved += idle.len();
             for (number, &play) in idle.iter().enumerate() {

@@ -225,6 +225,7 @@ impl<'a> Sensitivity<'a> {
 mod tests {
     use super::*;
     use crate::chain::hysteresis::Elements;
+    use crate::chain::prior::Prior;
     use crate::effects::{Effect, HysteresisShape};
     use crate::operators::Operator;
 
@@ -259,6 +260,7 @@ mod tests {
             slopes: vec![1.1, 0.3, -0.4],
             half_widths: vec![0.0, 0.31, 0.8],
             weights: vec![1.0, 0.5, 0.7],
+            prior: Prior::default(),
         };
         let start = [0.0, 0.4, -0.3];
         let u: Vec<f64> = (0..300)
@@ -319,6 +321,7 @@ mod tests {
             slopes: vec![1.0],
             half_widths: vec![0.31, 0.8],
             weights: vec![0.5, 0.7],
+            prior: Prior::default(),
         };
         let coefficients = vec![0.2, -0.3, 0.1, -0.1, 0.25, 0.4];
         let shape = HysteresisShape {

@@ -124,6 +124,7 @@ impl Parameters {
 mod tests {
     use super::*;
     use crate::chain::hysteresis::Elements;
+    use crate::chain::prior::Prior;
 
     fn envelope(thresholds: &[f64], slopes: &[f64]) -> Parameters {
         Parameters {
@@ -133,6 +134,7 @@ mod tests {
             slopes: slopes.to_vec(),
             half_widths: vec![0.0],
             weights: vec![1.0],
+            prior: Prior::default(),
         }
     }
 

@@ -36,6 +36,7 @@ mod refinement;
 pub(crate) mod representatives;
 mod sensitivities;
 mod settings;
+pub(crate) mod smooth;
 
 pub use crate::optimize::Status;
 pub use another_record::{OnAnotherRecord, functions_of_time, on_another_record};

@@ -261,6 +261,7 @@ mod tests {
     use super::*;
     use crate::Channel;
     use crate::chain::hysteresis::Elements;
+    use crate::chain::prior::Prior;
     use crate::operators::Reading;
 
     #[test]
@@ -279,6 +280,7 @@ mod tests {
             slopes: vec![1.0],
             half_widths: vec![0.0, 1.0],
             weights: vec![1.0, 0.5],
+            prior: Prior::default(),
         };
         let prepared = Prepared::new(&record, vec![channel]).unwrap();
         let own = &prepared.record.experiments()[0];

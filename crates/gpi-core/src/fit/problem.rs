@@ -13,6 +13,8 @@
 //! The offset and the initial state of an experiment move its own output only. The products of an experiment are therefore
 //! those of the shared unknowns and its own ones, and the Gram matrix of all unknowns has the shape of an arrow.
 //!
+//! Where the hysteresis has a prior ([`crate::chain::prior`]), its terms are added to all three.
+//!
 //! psi is never stored: its rows are streamed through the chain in blocks, each block is added to `gram` and
 //! `descent`, and the memory needed does not grow with N times unknowns. Where the Gram matrix of a whole record would
 //! take long, it comes from a part of it (see [`representatives`]) and the gradient from an adjoint pass, which costs a
@@ -24,6 +26,7 @@ use super::representatives::{representatives, streamed};
 use super::settings::ROUNDING;
 use crate::chain::adjoint::descent;
 use crate::chain::point::{Freedom, Point};
+use crate::chain::prior::add_prior;
 use crate::chain::stream::{Rows, Stream};
 use crate::chain::table::Table;
 use crate::linear::{Arrow, NormalEquations};
@@ -51,7 +54,8 @@ impl LeastSquares for Estimation<'_> {
     type Error = Error;
 
     fn evaluate(&self, point: &Point) -> Result<f64, Error> {
-        Ok(self.loss.cost(scored(&point.residuals(self.record)?, self.record)))
+        let cost = self.loss.cost(scored(&point.residuals(self.record)?, self.record));
+        Ok(cost + point.penalty(&self.table))
     }
 
     /// Where the derivatives of a whole record would take long, the curvature is that of a few experiments; the
@@ -77,13 +81,18 @@ impl LeastSquares for Estimation<'_> {
             gram.add_part(&part.gram, &places);
             places.iter().zip(part.rhs.iter()).for_each(|(&i, value)| descent[i] += value);
         }
+        let prior = point.prior(&self.table);
         let Some(few) = few else {
-            return Ok(Linearization { gram, descent, cost, age: None });
+            add_prior(&prior, &mut gram);
+            let penalty = point.penalise(&self.table, &mut descent);
+            return Ok(Linearization { gram, descent, cost: cost + penalty, age: None });
         };
         let mut gram = gram.to_dense();
         few.extend(&mut gram, &self.table, self.record);
+        let mut gram = gram.into();
+        add_prior(&prior, &mut gram);
         let (descent, cost) = self.gradient(point, check)?;
-        Ok(Linearization { gram: gram.into(), descent, cost, age: Some(0) })
+        Ok(Linearization { gram, descent, cost, age: Some(0) })
     }
 
     fn gradient(
@@ -91,7 +100,10 @@ impl LeastSquares for Estimation<'_> {
         point: &Point,
         check: &mut dyn FnMut() -> Result<(), Error>,
     ) -> Result<(DVector<f64>, f64), Error> {
-        descent(point, &self.table, self.freedom, self.loss, self.record, check)
+        let (mut descent, cost) =
+            descent(point, &self.table, self.freedom, self.loss, self.record, check)?;
+        let penalty = point.penalise(&self.table, &mut descent);
+        Ok((descent, cost + penalty))
     }
 
     fn bounds(&self, point: &Point) -> Bounds {
@@ -157,6 +169,7 @@ mod tests {
     use crate::chain::hysteresis::Parameters;
     use crate::chain::looped::{fine, model, record, run};
     use crate::chain::point::DynamicsFreedom;
+    use crate::chain::prior::Prior;
     use crate::chain::sensitivity::Derivatives;
     use crate::fit::preparation::Prepared;
 
@@ -173,6 +186,7 @@ mod tests {
         let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
         let prepared = Prepared::scoring_all(&record, channels).unwrap();
         let mut point = prepared.point_of(model).unwrap();
+        point.channels[0].prior = Prior { weights: 0.3, slopes: 0.2 };
         point.dynamics.delay = 2;
         point.pasts[1].state.iter_mut().enumerate().for_each(|(j, x)| *x = 0.1 * (j + 1) as f64);
         let freedom = Freedom {

@@ -13,6 +13,8 @@ pub(crate) struct FitSettings {
     pub preparation: PreparationSettings,
     /// Plays on a dense grid.
     pub dense: DenseSettings,
+    /// A smooth density of plays.
+    pub smooth: SmoothSettings,
     /// The joint fit.
     pub joint: JointSettings,
     /// What is removed from a fitted model.
@@ -43,6 +45,7 @@ impl FitSettings {
     pub(crate) fn validate(&self) -> Result<(), Error> {
         self.preparation.validate()?;
         self.dense.validate()?;
+        self.smooth.validate()?;
         self.joint.validate()?;
         let JointSettings { fewest_steps, most_steps, .. } = self.joint;
         if fewest_steps > most_steps {
@@ -80,6 +83,29 @@ settings! {
         /// Steps, and the part of the cost below which a step is the last. By hand: the joint fit follows.
         steps: usize = 8, FROM_ONE;
         gain: f64 = 1e-4, PART;
+    }
+
+    /// A smooth density of plays, see [`smooth`](super::smooth).
+    struct SmoothSettings {
+        /// Half-widths, zero included: the turning points of a measured cycle of 8000 samples do not tell more apart. By hand.
+        half_widths: usize = 40, 4.0..=1e3;
+        /// Deadzones: as many as the richest structure that is compared has.
+        thresholds: usize = 10, 0.0..=1e3;
+        /// The slopes of the deadzones that are expected at first. By hand: the data change it.
+        slopes: f64 = 0.3, POSITIVE;
+        /// Steps of the fit between two changes of the prior, the part of the cost below which a step is the last, and changes at most. By hand.
+        steps: usize = 6, FROM_ONE;
+        gain: f64 = 1e-4, PART;
+        rounds: usize = 5, FROM_ONE;
+        /// Changes of the prior on each quadratic model of the cost. By hand: each takes little time.
+        iterations: usize = 10, FROM_ONE;
+        /// Logarithm of the change of a factor below which it is the last. By hand.
+        change: f64 = 0.2, POSITIVE;
+        /// The least number of combinations that the data determine.
+        least: f64 = 0.1, POSITIVE;
+        /// Root mean square second difference of the weights over their mean, and of the slopes, that is expected at least, which bounds
+        /// the factors. By hand: no record shows less.
+        finest: f64 = 1e-3, POSITIVE;
     }
 
     /// The joint fit.

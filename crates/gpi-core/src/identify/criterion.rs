@@ -24,7 +24,9 @@ use crate::fit::RefineOptions;
 use crate::fit::joint::{Refined, joint};
 use crate::fit::line_modes::{is_same, line_modes};
 use crate::fit::memory::Memory;
+use crate::fit::minimize::Fitted;
 use crate::fit::preparation::Prepared;
+use crate::fit::smooth::determined_by_prior;
 use crate::identify::identification::Candidate;
 use crate::identify::settings::StructurePolicy;
 use crate::progress::{Progress, as_trial, reached};
@@ -138,8 +140,12 @@ impl<'a> Comparison<'a> {
         // a model of it must exist
         refined.fitted.point.dynamics.to_state_space()?;
         let uncertainty = refined.uncertainty(&self.prepared.record, progress)?;
-        let parameters = uncertainty.estimated;
-        let rms = (refined.fitted.linearization.cost / self.prepared.values()).sqrt();
+        let Fitted { point, table, linearization, .. } = &refined.fitted;
+        let bounds = point.bounds(table, &self.prepared.record, refined.options.freedom);
+        let of_prior = determined_by_prior(&refined.fitted, &bounds).round() as usize;
+        let parameters = uncertainty.estimated - of_prior.min(uncertainty.estimated);
+        let cost = linearization.cost - point.penalty(table);
+        let rms = (cost / self.prepared.values()).sqrt();
         reached(progress, "uncertainty", rms)?;
         let point = &refined.fitted.point;
         self.candidates.push(Candidate {

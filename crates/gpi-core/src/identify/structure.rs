@@ -9,6 +9,7 @@ use crate::fit::joint::{Refined, fit_options};
 use crate::fit::minimize::{FitOptions, fit};
 use crate::fit::preparation::{Prepared, rescale};
 use crate::fit::problem::residual_rms;
+use crate::fit::smooth::smooth;
 use crate::fit::{Grid, RefineOptions};
 use crate::identify::alternation::{DynamicsEstimate, Taps};
 use crate::identify::criterion::Comparison;
@@ -224,25 +225,34 @@ impl<'a> StructureSearch<'a> {
         Ok(())
     }
 
-    /// Tries the plays that a dense grid asks for, where the best candidate is above the noise.
+    /// Tries the plays that a dense grid asks for, then a smooth density of plays, where the best candidate is above the noise.
     pub(super) fn enrich(&mut self, progress: Progress) -> Result<(), Error> {
-        let Comparison { prepared, policy, .. } = &self.comparison;
-        let Some(point) = self.comparison.best().cloned() else { return Ok(()) };
-        let is_given = matches!(self.half_widths, Some(Grid::Values(_)));
-        let residuals = point.residuals(&prepared.record)?;
-        let noise = NoiseFloor::estimate(&prepared.record, &residuals).rms;
-        let left = residual_rms(&residuals, &prepared.record);
-        let is_noise =
-            left.iter().zip(noise).all(|(left, noise)| *left <= policy.near_noise * noise);
-        if is_given || is_noise {
-            return Ok(());
+        let are_given = self.thresholds.is_some();
+        let smooth = |point: &Point, prepared: &Prepared, progress: Progress| {
+            smooth(point, prepared, are_given, progress)
+        };
+        type Richer<'a> = &'a dyn Fn(&Point, &Prepared, Progress) -> Result<Point, Error>;
+        for richer in [&dense as Richer, &smooth] {
+            let Comparison { prepared, policy, .. } = &self.comparison;
+            let Some(point) = self.comparison.best().cloned() else { return Ok(()) };
+            let is_given = matches!(self.half_widths, Some(Grid::Values(_)));
+            let residuals = point.residuals(&prepared.record)?;
+            let noise = NoiseFloor::estimate(&prepared.record, &residuals).rms;
+            let left = residual_rms(&residuals, &prepared.record);
+            let is_noise =
+                left.iter().zip(noise).all(|(left, noise)| *left <= policy.near_noise * noise);
+            if is_given || is_noise {
+                return Ok(());
+            }
+            let rich = richer(&point, prepared, progress);
+            let Ok(rich) = Error::unless_interrupted(rich)? else { continue };
+            match self.comparison.offer(rich, progress) {
+                // a record too short for so many plays has its model already
+                Err(Error::TooFewSamples { .. }) => {}
+                offered => drop(offered?),
+            }
         }
-        let rich = dense(&point, prepared, progress)?;
-        match self.comparison.offer(rich, progress) {
-            // a record too short for so many plays has its model already
-            Err(Error::TooFewSamples { .. }) => Ok(()),
-            offered => offered.map(|_| ()),
-        }
+        Ok(())
     }
 
     /// The seed's dynamics behind a hysteresis on new grids, fitted with the poles kept.
