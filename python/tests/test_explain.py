@@ -32,16 +32,20 @@ def not_yet(name, strength, why):
     )
 
 
+def slow(name, strength):
+    return pytest.param(name, strength, marks=pytest.mark.slow)
+
+
 CASES = [
     ("creep", 15.0),
     ("periodic-disturbance", 8.0),
-    ("output-nonlinearity", 25.0),
+    slow("output-nonlinearity", 25.0),
     ("outliers", 8.0),
     ("coloured-noise", 4.0),
     ("covariate", 10.0),
-    ("drift", 10.0),
-    ("rate-dependence", 20.0),
-    ("gain-drift", 10.0),
+    slow("drift", 10.0),
+    slow("rate-dependence", 20.0),
+    slow("gain-drift", 10.0),
     ("backlash", 15.0),
     not_yet("stiffness", 15.0, "named, but a part of it is left"),
 ]

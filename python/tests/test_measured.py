@@ -44,6 +44,7 @@ def test_piezo_stack_on_another_experiment(tmp_path: Path, capsys: pytest.Captur
     assert error["nrmse"] < 0.008
 
 
+@pytest.mark.slow
 def test_a_short_record_of_slow_tanks_gets_a_simple_model(capsys: pytest.CaptureFixture[str]) -> None:
     record = MEASURED / "cascaded-tanks" / "estimation.csv.gz"
     found = call(capsys, "identify", record)
