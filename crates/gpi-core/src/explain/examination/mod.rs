@@ -12,7 +12,7 @@
 //! nonsense of the answers.
 //!
 //! 3. *Its own part*: what it adds to the output differs from all that the rest of the model can do ([`own_part`]), or a fit
-//!    without it leaves more than the noise.
+//!    without it leaves more than the noise. The latter does not count for a slow function of time.
 //! 4. *Slow*: a slow function of time is slower than the lags of G, and predicts gaps between its knots as well as it fits
 //!    ([`gaps`]).
 //! 5. *Small, or at the noise*: an effect that is a large part of the output, acts a few times only, or acts like a misfit
@@ -95,12 +95,13 @@ pub(super) fn doubt(
     if matches!(point.effects[place].place(), Place::Loops(_)) && is_saturated(state)? {
         return Ok(Some(Refusal::Saturates));
     }
+    let is_slow = point.effects[place].entry().signature == Signature::SlowInTime;
+    // what a slow function of time does beyond the bounds of a slower creep, for example, says nothing of its cause
     if !own_part::is_beyond_chance(state, point, place, state.cost)?
-        && !is_needed(state, place, progress)?
+        && (is_slow || !is_needed(state, place, progress)?)
     {
         return Ok(Some(Refusal::NotItsOwn));
     }
-    let is_slow = point.effects[place].entry().signature == Signature::SlowInTime;
     if is_slow && gaps::is_as_fast_as_lags(&state.prepared.record, point, place) {
         return Ok(Some(Refusal::AsFastAsLags));
     }
