@@ -7,8 +7,9 @@ use crate::chain::point::Point;
 use crate::fit::excerpt::excerpt;
 use crate::fit::joint::joint;
 use crate::fit::preparation::Prepared;
+use crate::identify::elements::compare_on_all;
 use crate::identify::identification::{IdentifyOptions, Quick};
-use crate::identify::procedure::{Compared, compare_on_all, prepare};
+use crate::identify::procedure::{Compared, prepare};
 use crate::identify::structure::refine_options;
 use crate::progress::Progress;
 

@@ -10,6 +10,7 @@
 
 mod alternation;
 mod criterion;
+mod elements;
 mod entry;
 mod identification;
 pub(crate) mod long_record;
