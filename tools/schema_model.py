@@ -136,7 +136,9 @@ EFFECTS: dict[str, Schema] = {
         {"output": OUTPUT, "half_width": size()},
         {
             "missing": number(
-                "the part of a force's stiffness that is missing while the gap is open", maximum=1
+                "the part of a force's stiffness that is missing while the gap is open",
+                exclusiveMinimum=0,
+                maximum=1,
             )
         },
     ),

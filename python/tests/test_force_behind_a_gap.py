@@ -99,8 +99,7 @@ def test_no_gap_is_named_where_there_is_none(kind, seed):
     assert named == {"backlash"} if kind is behind_a_gap else named <= {"hysteresis-shape"}
 
 
-def test_stops_are_found_where_the_dynamics_of_plays_lead_nowhere():
-    """Dry friction hardly depends on the displacement: the best plays are no start for it."""
+def test_dry_friction_gets_stops_without_deadzones():
     random = np.random.default_rng(7)
     u = displacement(random, 3000)
     model = gpi.identify(measured(u, 10 * stop(u, 0.03), random))

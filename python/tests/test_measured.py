@@ -45,6 +45,18 @@ def test_piezo_stack_on_another_experiment(tmp_path: Path, capsys: pytest.Captur
 
 
 @pytest.mark.slow
+def test_a_friction_damper_gets_stops(capsys: pytest.CaptureFixture[str]) -> None:
+    # the dynamics of the best plays are no start for stops on this record
+    path = MEASURED / "friction-damper" / "0.5Hz_30lb.csv.gz"
+    record = gpi.read_record(path, input="displacement_in", output="force_kip", covariate=[])
+    training, last = record.split(0.7)
+    model = gpi.identify(training)
+    held_out = model.error(last, fit_start=True)["rms"]
+    show(capsys, f"friction damper, last 30 %: {held_out:.3f} kip")
+    assert min(model.hysteresis[0].plays.weights) < 0 and held_out < 0.3
+
+
+@pytest.mark.slow
 def test_a_short_record_of_slow_tanks_gets_a_simple_model(capsys: pytest.CaptureFixture[str]) -> None:
     record = MEASURED / "cascaded-tanks" / "estimation.csv.gz"
     found = call(capsys, "identify", record)

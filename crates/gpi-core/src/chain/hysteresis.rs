@@ -18,7 +18,6 @@
 //! v.
 
 use super::plays::Plays;
-use super::prior::Prior;
 use crate::effects::{Effect, PlayCurves};
 use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
 use crate::{Hysteresis, Matrix};
@@ -54,6 +53,21 @@ impl Elements {
             Self::Stops if place > 0 => weight.min(0.0),
             Self::Plays | Self::Stops => weight.max(0.0),
         }
+    }
+}
+
+/// How much second differences of the weights and slopes of the deadzones cost, see [`super::prior`]; zero for no prior.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Prior {
+    /// w.
+    pub weights: f64,
+    /// s.
+    pub slopes: f64,
+}
+
+impl Prior {
+    pub(crate) fn is_none(&self) -> bool {
+        *self == Self::default()
     }
 }
 

@@ -13,20 +13,12 @@
 //! Source: G. Pillonetto, F. Dinuzzo, T. Chen, G. De Nicolao, L. Ljung, *Kernel methods in system identification, machine learning and function
 //! estimation: a survey*, Automatica 50, 2014.
 
+use super::hysteresis::Prior;
 use super::point::Point;
 use super::table::{Group, Table};
 use crate::Matrix;
 use crate::linear::Arrow;
 use nalgebra::DVector;
-
-/// How much second differences of the weights and slopes of the deadzones cost; zero for no prior.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Prior {
-    /// w.
-    pub weights: f64,
-    /// s.
-    pub slopes: f64,
-}
 
 /// A part of the prior: the places of its unknowns, its matrix K and its factor, which add `factor x' K x`.
 pub(crate) struct PriorPart {
@@ -37,12 +29,6 @@ pub(crate) struct PriorPart {
     pub input: usize,
     /// Whether it is about the weights, or else about the slopes.
     pub is_of_weights: bool,
-}
-
-impl Prior {
-    pub(crate) fn is_none(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
 impl PriorPart {

@@ -225,7 +225,7 @@ impl<'a> Sensitivity<'a> {
 mod tests {
     use super::*;
     use crate::chain::hysteresis::Elements;
-    use crate::chain::prior::Prior;
+    use crate::chain::hysteresis::Prior;
     use crate::effects::{Effect, HysteresisShape};
     use crate::operators::Operator;
 

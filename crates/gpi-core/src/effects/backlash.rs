@@ -32,7 +32,7 @@ pub struct Backlash {
     pub missing: Option<f64>,
 }
 
-/// s of a proposal, and its bounds. At the lower one, there is hardly a gap.
+/// s of a proposal: most of the stiffness. By hand: the fit changes it. Below the least one, there is hardly a gap.
 const MISSING: f64 = 0.8;
 const LEAST_MISSING: f64 = 0.01;
 

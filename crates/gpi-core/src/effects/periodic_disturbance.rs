@@ -117,7 +117,8 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
     const MISFIT: f64 = 0.02;
     /// Smallest part of the input's power in its strongest line.
     const MOST: f64 = 0.9;
-    /// The error of the model over the displacement at a line, over the same for the whole signals, at most.
+    /// The error of the model over the displacement at a line, over the same for the whole signals, at most. By hand: an error
+    /// may be larger at one line than on average.
     const CONCENTRATED: f64 = 3.0;
     let displacement = situation.displacements[experiment].column(output);
     let residual = situation.residuals[experiment].column(output);

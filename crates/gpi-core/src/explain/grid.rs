@@ -42,8 +42,7 @@ impl Place {
 pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let policy = &state.setup.policy.grid;
     state.is_rich = true;
-    let is_held = !state.setup.moving.half_widths && !state.setup.moving.thresholds;
-    if is_held || state.point.has_prior() {
+    if !state.setup.moving.half_widths && !state.setup.moving.thresholds {
         return Ok(false);
     }
     let values = state.prepared.values();

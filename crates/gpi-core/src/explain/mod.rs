@@ -127,9 +127,7 @@ pub fn explain(
     // none at all is a grid too
     let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_) | Grid::Count(0)));
     // a bank of stops that has no deadzones gets none later
-    let is_straight = prepared.channels.iter().all(|channel| channel.thresholds.len() == 1);
-    let is_held =
-        quick.fewer[1] && is_straight && refined.fitted.point.output_kind() == OutputKind::Force;
+    let is_held = quick.fewer[1] && refined.fitted.point.output_kind() == OutputKind::Force;
     let moving = RefineOptions {
         thresholds: !(is_held || given(&identify.thresholds)),
         half_widths: !given(&identify.half_widths),

@@ -4,6 +4,7 @@
 //! then. When the displacement has moved by 2 r_i since its direction was reversed, element i slips. The friction force is that of
 //! all elements, behind a gap if there is one.
 
+use super::verdict::typed;
 use crate::chain::point::Point;
 use crate::effects::{Moment, OutputKind, OutputStage};
 use crate::{Channel, Record};
@@ -35,11 +36,11 @@ pub(super) fn in_words(point: &Point, record: &Record) -> Option<String> {
     };
     (widest > 0.0).then(|| {
         format!(
-            "The hysteresis consists of stops, because the output leads the input, as the force of friction leads the displacement. If the output \
-             is a force, the friction force is {:.4}{}, and it is reached when the displacement has moved by {:.4}{} since its direction was reversed.",
-            force.abs(),
+            "The hysteresis consists of stops: the output leads the input, as the force of friction leads the displacement. If the \
+             output is a force, the friction force is {}{}. It is reached when the displacement has moved by {}{} after a reversal.",
+            typed(force.abs()),
             unit(output),
-            2.0 * widest / channel.slopes[0].abs(),
+            typed(2.0 * widest / channel.slopes[0].abs()),
             unit(input),
         )
     })

@@ -104,7 +104,7 @@ fn separation(by: SeparatedBy) -> (&'static str, &'static str) {
 }
 
 /// A number that can be typed: four significant digits, all digits before the point.
-fn typed(number: f64) -> f64 {
+pub(super) fn typed(number: f64) -> f64 {
     if number == 0.0 || !number.is_finite() {
         return 0.0;
     }

@@ -123,8 +123,7 @@ impl Parameters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::hysteresis::Elements;
-    use crate::chain::prior::Prior;
+    use crate::chain::hysteresis::{Elements, Prior};
 
     fn envelope(thresholds: &[f64], slopes: &[f64]) -> Parameters {
         Parameters {

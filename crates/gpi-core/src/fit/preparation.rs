@@ -260,8 +260,7 @@ pub(crate) fn rescale(point: &mut Point) {
 mod tests {
     use super::*;
     use crate::Channel;
-    use crate::chain::hysteresis::Elements;
-    use crate::chain::prior::Prior;
+    use crate::chain::hysteresis::{Elements, Prior};
     use crate::operators::Reading;
 
     #[test]

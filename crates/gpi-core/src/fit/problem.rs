@@ -167,9 +167,9 @@ mod tests {
     use super::*;
     use crate::Model;
     use crate::chain::hysteresis::Parameters;
+    use crate::chain::hysteresis::Prior;
     use crate::chain::looped::{fine, model, record, run};
     use crate::chain::point::DynamicsFreedom;
-    use crate::chain::prior::Prior;
     use crate::chain::sensitivity::Derivatives;
     use crate::fit::preparation::Prepared;
 

@@ -87,7 +87,7 @@ settings! {
 
     /// A smooth density of plays, see [`smooth`](super::smooth).
     struct SmoothSettings {
-        /// Half-widths, zero included: the turning points of a measured cycle of 8000 samples do not tell more apart. By hand.
+        /// Half-widths, zero included. By hand: enough for a smooth density, few enough for a fit.
         half_widths: usize = 40, 4.0..=1e3;
         /// Deadzones: as many as the richest structure that is compared has.
         thresholds: usize = 10, 0.0..=1e3;

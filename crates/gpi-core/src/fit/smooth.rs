@@ -19,12 +19,13 @@
 
 use super::settings::SmoothSettings;
 use crate::chain::bounds::range;
-use crate::chain::hysteresis::Parameters;
+use crate::chain::hysteresis::{Parameters, Prior};
 use crate::chain::point::{DynamicsFreedom, Point};
-use crate::chain::prior::{Prior, PriorPart, add_prior};
+use crate::chain::prior::{PriorPart, add_prior};
 use crate::fit::joint::{Refined, fit_options};
 use crate::fit::minimize::{FitOptions, Fitted, fit};
 use crate::fit::preparation::Prepared;
+use crate::fit::problem::residual_rms;
 use crate::fit::{Grid, RefineOptions};
 use crate::linear::{Arrow, bounded};
 use crate::optimize::Bounds;
@@ -100,7 +101,7 @@ fn mean_weight(channel: &Parameters) -> f64 {
 /// The mean square of the training residual, in units of the cost.
 fn variance(point: &Point, prepared: &Prepared) -> Result<f64, Error> {
     let residuals = point.residuals(&prepared.record)?;
-    let rms = super::problem::residual_rms(&residuals, &prepared.record);
+    let rms = residual_rms(&residuals, &prepared.record);
     Ok(rms.iter().map(|rms| rms * rms).sum::<f64>() / rms.len() as f64)
 }
 

@@ -11,7 +11,7 @@ use crate::linear::{self, Sections};
 use crate::progress::{Progress, report};
 use crate::{Error, Matrix};
 
-/// The least squares gain from all inputs to all outputs.
+/// The least squares gain, (outputs, inputs).
 pub(super) fn gain(prepared: &Prepared) -> Result<Matrix, Error> {
     Ok(linear::estimate(&prepared.record.pieces(0)?, 1, 0.0)?.markov.remove(0))
 }

@@ -136,8 +136,8 @@ settings! {
         /// The part of the squares of plays that stops with as many parameters may leave at most to be taken instead. By hand: without hysteresis,
         /// both leave the same.
         of_stops: f64 = 0.8, PART;
-        /// The part of the squares of stops without deadzones that deadzones may leave at most to be taken too. By hand: a gap that the force
-        /// passes let them leave 0.6 on the record of a friction damper, and a saturating force less than 0.1 in simulations.
+        /// The part of the squares of stops without deadzones that deadzones may leave at most to be taken too. By hand: deadzones follow
+        /// a gap that the force passes only in part, and a field that saturates nearly completely.
         of_deadzones: f64 = 0.5, PART;
         /// Steps of the hysteresis on new grids, and the part of the cost below which a step is the last. By hand:
         /// the joint fit follows.
