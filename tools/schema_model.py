@@ -163,7 +163,11 @@ EFFECTS: dict[str, Schema] = {
             "time_constant": size("of the lag in s; 0 for none"),
             "step": number(),
         },
-        BEFORE_SENSOR,
+        BEFORE_SENSOR
+        | {
+            "start": number("by which the lag differs from the first value before the record"),
+            "range": size("largest less smallest value of the column, which bounds the start; 0 holds it"),
+        },
     ),
     "outliers": closed({"count": count(), "samples": count(), "size": size()}),
     "coloured-noise": closed(

@@ -119,6 +119,8 @@ EFFECTS: dict[str, dict[str, Any]] = {
         "gain": 0.4,
         "time_constant": 0.2,
         "step": 1e-3,
+        "start": 1.5,
+        "range": 2.0,
     },
 }
 

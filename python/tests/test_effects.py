@@ -274,10 +274,19 @@ def test_a_covariate_leaks_in(time_constant):
     model = with_effect(model_of(plant()), name="covariate", **effect)
     # the lag takes the present sample in
     leak = x if time_constant == 0 else np.append(lag(x, time_constant), 0)[1:]
+    pole = 0.0
     if time_constant > 0:
         pole = np.exp(-1 / (time_constant * RATE))
         leak[-1] = pole * lag(x, time_constant)[-1] + (1 - pole) * x[-1]
     np.testing.assert_allclose(model.simulate(u, covariates=x), chain(u) + 0.4 * leak, rtol=0, atol=1e-10)
+    begun = with_effect(model_of(plant()), name="covariate", **effect, start=0.7, range=2.0)
+    decay = 0.7 * pole ** np.arange(1, len(u) + 1)
+    np.testing.assert_allclose(
+        begun.simulate(u, covariates=x), chain(u) + 0.4 * (leak + decay), rtol=0, atol=1e-10
+    )
+    # another record has another past
+    other = gpi.Record(u, chain(u) + 0.4 * leak, RATE, covariates=x, covariate_names=["x"])
+    assert begun.on_another_record(other, fit_start=False)["error"]["rms"] < 1e-9
     for missing in (None, np.zeros((len(u), 0))):
         with pytest.raises(gpi.ParameterError, match="covariates.*covariate.*`x`"):
             model.simulate(u, covariates=missing)

@@ -210,6 +210,7 @@ def periodic_disturbance(own: Parameters, around: Around) -> list[Operation]:
 def covariate(own: Parameters, around: Around) -> list[Operation]:
     """(E13): another measured column is added, directly or through a lag."""
     numbers = {"share": share(own["time_constant"], around.rate), "gain": own["gain"]}
+    numbers["start"] = own.get("start", 0.0)
     return [
         Operation(
             "leak",

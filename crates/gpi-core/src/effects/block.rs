@@ -43,6 +43,9 @@ pub trait Block {
         true
     }
 
+    /// Forgets in which state the record began that it was fitted to: another record begins in another one.
+    fn forget_start(&mut self) {}
+
     /// Drops the terms of a sum that make these values implausible; `false` if there are none, or if no term would be left.
     fn drop_implausible(&mut self, _duration: f64) -> bool {
         false

@@ -4,6 +4,9 @@
 //! axis) is added, either directly or through a first-order lag L of unit gain and time constant T,
 //! `x_L(k) = z x_L(k-1) + (1 - z) x(k)`, `z = exp(-Ts / T)`.
 //!
+//! The record shows no past of x: `x_L(-1) = x(0) + s`. The start s is estimated with g and T, within the range that x has in
+//! the record, is the same in all of its experiments, and belongs to that record alone.
+//!
 //! A column that only repeats an input or an output is not proposed: it is the reference of a loop, or another sensor of the
 //! same signal, and no disturbance.
 
@@ -30,6 +33,12 @@ pub struct Covariate {
     pub time_constant: f64,
     /// A change of g that moves the output by a thousandth of its span.
     pub step: f64,
+    /// s, by which the lag differs from x(0) before the record, in the column's unit.
+    #[serde(default)]
+    pub start: f64,
+    /// Largest less smallest x of the record, which bounds s; 0 holds s.
+    #[serde(default)]
+    pub range: f64,
 }
 
 impl Covariate {
@@ -80,12 +89,27 @@ impl Covariate {
                         gain: 0.0,
                         time_constant,
                         step,
+                        start: 0.0,
+                        range: high - low,
                     };
                     found.push(Proposal::linear(block, [0]));
                 }
             }
         }
         found
+    }
+}
+
+impl Covariate {
+    /// How many values are estimated: a column without a lag has no start, and one whose range is unknown is held.
+    fn count(&self) -> usize {
+        if self.time_constant <= 0.0 {
+            1
+        } else if self.range <= 0.0 {
+            2
+        } else {
+            3
+        }
     }
 }
 
@@ -121,7 +145,8 @@ fn follows(
 
 impl Block for Covariate {
     fn values(&self) -> Vec<f64> {
-        if self.time_constant > 0.0 { vec![self.gain, self.time_constant] } else { vec![self.gain] }
+        let all = [self.gain, self.time_constant, self.start];
+        all[..self.count()].to_vec()
     }
 
     fn set(&mut self, values: &[f64]) {
@@ -129,15 +154,19 @@ impl Block for Covariate {
         if let Some(&time) = values.get(1) {
             self.time_constant = time;
         }
+        if let Some(&start) = values.get(2) {
+            self.start = start;
+        }
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {
         let time = (0.3 * self.time_constant, 3.0 * self.time_constant);
-        vec![(f64::NEG_INFINITY, f64::INFINITY), time][..self.values().len()].to_vec()
+        let start = (-self.range, self.range);
+        vec![(f64::NEG_INFINITY, f64::INFINITY), time, start][..self.count()].to_vec()
     }
 
     fn steps(&self) -> Vec<f64> {
-        vec![self.step, 1e-4 * self.time_constant][..self.values().len()].to_vec()
+        vec![self.step, 1e-4 * self.time_constant, 1e-3 * self.range][..self.count()].to_vec()
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
@@ -147,12 +176,19 @@ impl Block for Covariate {
         if self.time_constant > 0.0 {
             quantities.push(Quantity::new("time_constant", "s", self.time_constant));
         }
+        if self.count() > 2 {
+            quantities.push(Quantity::new(format!("start of {}", self.label), &self.label, self.start));
+        }
         quantities
     }
 
     fn flaw(&self) -> Option<String> {
         let lag = self.time_constant;
         (lag < 0.0).then(|| format!("its time constant of {lag} s must not be negative"))
+    }
+
+    fn forget_start(&mut self) {
+        self.start = 0.0;
     }
 }
 
@@ -173,9 +209,9 @@ impl Added for Covariate {
         Some((self.column, &self.label))
     }
 
-    /// The column behind the lag.
+    /// The column behind the lag before the record.
     fn rest(&self, moment: Moment) -> Vec<f64> {
-        vec![moment.covariates.get(self.column).copied().unwrap_or(0.0)]
+        vec![moment.covariates.get(self.column).copied().unwrap_or(0.0) + self.start]
     }
 
     fn add(&self, state: &mut [f64], moment: Moment) -> f64 {

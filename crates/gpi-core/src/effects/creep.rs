@@ -56,7 +56,8 @@ impl Creep {
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
     pub(super) const IS_EXPANSION: bool = false;
 
-    /// One, two and three lags between the shortest time constant and the record's length.
+    /// One, two, three and five lags between the shortest time constant and the record's length. Creep that grows with the
+    /// logarithm of time needs about two for each decade.
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         const MORE: f64 = 5.0 / 3.0;
         let (low, high) = (MORE * shortest(situation.record.rate()), situation.duration());
@@ -67,6 +68,7 @@ impl Creep {
         let mut sets: Vec<Vec<f64>> = (0..9).map(|i| vec![between(f64::from(i) / 8.0)]).collect();
         sets.push(vec![between(0.3), between(0.8)]);
         sets.push(vec![between(0.15), between(0.5), between(0.85)]);
+        sets.push([0.1, 0.3, 0.5, 0.7, 0.9].map(between).to_vec());
         let block = |input, time_constants: &Vec<f64>| {
             let gains = vec![0.0; time_constants.len()];
             let block = Self { input, gains, time_constants: time_constants.clone(), dead_time: 0 };

@@ -226,6 +226,15 @@ impl Effect {
         part.place_mut().block().is_some_and(is_dropped).then_some(part)
     }
 
+    /// The same without the state in which its record began.
+    pub(crate) fn without_start(&self) -> Self {
+        let mut own = self.clone();
+        if let Some(block) = own.place_mut().block() {
+            block.forget_start();
+        }
+        own
+    }
+
     /// The same on the other side of the output stage, if it is an added signal.
     pub(crate) fn elsewhere(&self) -> Option<Self> {
         let mut moved = self.clone();

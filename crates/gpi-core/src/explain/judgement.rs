@@ -130,6 +130,8 @@ pub(super) enum Refusal {
     Saturates,
     /// It is a function of time whose knots are closer than a time constant of the dynamics.
     AsFastAsLags,
+    /// It is a function of time that leaves much of an error that is far above the noise.
+    FollowsTheRest,
     /// It is a spring inside a mechanical loop, and the dynamics have no resonance.
     NoResonance,
     /// The model without it, fitted from where the trial ended, explains as much.
@@ -173,6 +175,9 @@ impl Refusal {
             }
             Self::AsFastAsLags => {
                 "is a function of time that changes as fast as the dynamics, and may follow what they lack".to_owned()
+            }
+            Self::FollowsTheRest => {
+                "is a function of time that may follow what the model lacks, whose error would still be far above the noise".to_owned()
             }
             Self::NoResonance => "would act inside a mechanical loop, and the dynamics have no resonance".to_owned(),
             Self::LongerFit => "reduces the error no more than a longer fit of the model without it".to_owned(),

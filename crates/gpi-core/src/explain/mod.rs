@@ -145,7 +145,9 @@ pub fn explain(
     // the last fit of the declared model may have led a pole to creep
     revision::shed_lags(&mut state, &mut progress)?;
     let mut interrupted = is_interrupted(search::run(&mut state, &mut progress))?;
-    revision::settle_lags(&mut state)?;
+    if interrupted {
+        revision::settle_lags(&mut state)?;
+    }
     for entry in required {
         if !interrupted {
             let forced = search::force(&mut state, entry, &mut progress);

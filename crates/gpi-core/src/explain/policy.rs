@@ -254,6 +254,8 @@ settings! {
         /// The same of a gap that a force passes. By hand: a bank of stops with positive weights cannot follow a gap, so that
         /// most of the squares are the gap's.
         left_by_gap: f64 = 0.5, PART;
+        /// The same of a slow function of time: it must be three times what is left, because it can follow any slow error. By hand.
+        left_by_slow: f64 = 0.1, PART;
         /// Part by which the squares must fall for the model without a refused effect to be taken instead of the present one:
         /// that of a finer grid that goes on.
         better: f64 = 0.02, PART;

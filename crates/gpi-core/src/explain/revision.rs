@@ -168,7 +168,7 @@ pub(super) fn shed_lags(state: &mut SearchState, progress: Progress) -> Result<b
     };
     let fitted = state.fit(point, &state.setup.options, "slow poles", progress)?;
     let before = std::mem::replace(&mut state.point, fitted.point);
-    let additions = state.additions.len();
+    let additions = state.additions.clone();
     state.before_lags = Some(BeforeLags { point: before, cost: state.cost, additions });
     state.cost = fitted.linearization.cost;
     state.left.clear();
@@ -195,14 +195,18 @@ pub(super) fn shed_lines(state: &mut SearchState, progress: Progress) -> Result<
     Ok(true)
 }
 
-/// Goes back to what was before slow poles were taken out, where no effect explains as much as they did.
-pub(super) fn settle_lags(state: &mut SearchState) -> Result<(), Error> {
-    let Some(before) = state.before_lags.take() else { return Ok(()) };
+/// Goes back to what was before slow poles were taken out, where no effect explains as much as they did; says whether it
+/// did. What was refused since then has returned too, and is to be examined again.
+pub(super) fn settle_lags(state: &mut SearchState) -> Result<bool, Error> {
+    let Some(before) = state.before_lags.take() else { return Ok(false) };
     let most = state.setup.policy.revision.instead_of_lags * before.cost;
-    if state.additions.len() <= before.additions || state.cost > most {
-        state.additions.truncate(before.additions);
-        state.point = before.point;
+    let returns = state.additions.len() <= before.additions.len() || state.cost > most;
+    if returns {
+        (state.point, state.additions) = (before.point, before.additions);
+        let point = &state.point;
+        let has = |name| point.effects.iter().any(|effect| effect.name() == name);
+        state.refused.retain(|one| !has(one.effect));
         state.repair()?;
     }
-    Ok(())
+    Ok(returns)
 }

@@ -8,7 +8,7 @@ use super::judgement::{Evidence, Refusal, choose, judge, refusal};
 use super::probability::probabilities;
 use super::ranking::{ranked, scored_beside};
 use super::revision::{
-    drop_superfluous, rearrange, shed_lags, shed_lines, shed_sections, straighten,
+    drop_superfluous, rearrange, settle_lags, shed_lags, shed_lines, shed_sections, straighten,
 };
 use super::setup::SearchSetup;
 use super::state::{Addition, Rejected, SearchState, Trial};
@@ -32,6 +32,9 @@ pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Err
         if !examine_all(state, progress)? && !is_replaced {
             break;
         }
+    }
+    if settle_lags(state)? {
+        examine_all(state, progress)?;
     }
     Ok(())
 }

@@ -82,8 +82,8 @@ pub(super) struct Addition {
 pub(super) struct BeforeLags {
     pub point: Point,
     pub cost: f64,
-    /// Effects that had been added.
-    pub additions: usize,
+    /// What had been added.
+    pub additions: Vec<Addition>,
 }
 
 /// The state of a search.

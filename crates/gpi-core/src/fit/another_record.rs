@@ -7,11 +7,13 @@
 //!    error.
 //! 3. *Warm-up.* The samples behind the record's declared warm-up count, all others only drive the model.
 //! 4. *Effects.* An effect that neither the input nor a measured column drives (drift, disturbances, a changing gain) is a
-//!    function of the time of the record that it was fitted to. It says nothing of another record and is left out.
+//!    function of the time of the record that it was fitted to. It says nothing of another record and is left out. The lag of a
+//!    measured column begins at the column's first value.
 //!
 //! MATLAB's `compare` estimates the initial state in the same way.
 
 use super::initial_state::residuals_from_fitted_start;
+use crate::effects::Effect;
 use crate::progress::Progress;
 use crate::{Error, Matrix, Model, Record, SimulationError};
 
@@ -61,8 +63,8 @@ pub fn on_another_record(
     progress: Progress,
 ) -> Result<OnAnotherRecord, Error> {
     let left_out = functions_of_time(model);
-    let kept = model.effects().iter().filter(|effect| effect.entry().driven).cloned();
-    let model = model.clone().with_effects(kept.collect())?;
+    let kept = model.effects().iter().filter(|effect| effect.entry().driven);
+    let model = model.clone().with_effects(kept.map(Effect::without_start).collect())?;
     let residuals = if fit_start {
         residuals_from_fitted_start(&model, record, progress)?
     } else {

@@ -444,11 +444,11 @@ static real sinusoid(real *phase, real turns, real rest, real cosine, real sine)
 
 @end
 @leak
-static real leak(real *lag, real value, real share, real gain, unsigned long sample)
+static real leak(real *lag, real value, real share, real gain, real start, unsigned long sample)
 {
     real wanted, there;
     if (sample == 0)
-        lag[0] = value;
+        lag[0] = value + start;
     wanted = share * (value - lag[0]) + lag[1];
     there = lag[0] + wanted;
     lag[1] = wanted - (there - lag[0]);

@@ -382,9 +382,9 @@ fn sinusoid(phase: &mut [Real], turns: Real, rest: Real, cosine: Real, sine: Rea
 @end
 @leak
 
-fn leak(lag: &mut [Real], value: Real, share: Real, gain: Real, sample: u32) -> Real {
+fn leak(lag: &mut [Real], value: Real, share: Real, gain: Real, start: Real, sample: u32) -> Real {
     if sample == 0 {
-        lag[0] = value;
+        lag[0] = value + start;
     }
     let wanted = share * (value - lag[0]) + lag[1];
     let there = lag[0] + wanted;

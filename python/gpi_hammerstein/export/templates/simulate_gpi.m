@@ -362,7 +362,8 @@ function y = reading(own, y, covariates)
             y = y + own.cosine * cos(phase) + own.sine * sin(phase);
         case 'leak'
             x = covariates(:, own.column);
-            y = y + own.gain * (x(1) + filter(own.share, [1, own.share - 1], x - x(1)));
+            past = x(1) + own.start * (1 - own.share) .^ (k + 1);
+            y = y + own.gain * (past + filter(own.share, [1, own.share - 1], x - x(1)));
         otherwise
             unknown(own);
     end

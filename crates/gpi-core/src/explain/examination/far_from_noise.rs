@@ -16,6 +16,8 @@
 //!   response to a jump, whatever its cause;
 //! - a loop around dynamics whose output integrates the input, because it makes up for the integrator that G lacks, unless it leaves no more
 //!   than a part of the squares of the balance of forces ([`crate::explain::force_balance`]);
+//! - a slow function of time, because it can follow any slow error, unless it leaves no more than a part of the squares of the best model
+//!   without it and the output does not integrate the input: an integral of errors is slow;
 //! - a hysteretic force in such a loop that leaves more than a part of the squares of the best model without it, because it
 //!   resembles a hysteresis before the dynamics.
 //!
@@ -80,6 +82,10 @@ pub(super) fn doubt(
         }
     } else if size(state, point, place)? > policy.large {
         Ok(Some(Refusal::TooLarge))
+    } else if entry.signature == Signature::SlowInTime {
+        let follows = state.integrates()?
+            || state.cost > policy.left_by_slow * state.best_without(place, progress)?.1;
+        Ok(follows.then_some(Refusal::FollowsTheRest))
     } else {
         Ok(None)
     }
