@@ -16,8 +16,14 @@
 //!
 //! Unloading ends at zero after the length `l_0 = integral of 1 / (1 + k x^n) over x from 0 to g`, by Gauss's quadrature; the
 //! rest of the change is loading. Each part is integrated by the classical method of Runge and Kutta, with as many steps as
-//! make `n k g^(n-1) l` small, the shortest near zero. All numbers carry their derivatives ([`Jet`]), which are therefore those of the numerical
-//! solution.
+//! make `n k g^(n-1) l` small, the shortest near zero. A long loading would take many steps, because the force approaches its limit
+//! `G = k^(-1/n)`. There, the part e that is missing decays at a rate that hardly changes, and is integrated instead:
+//!
+//! ```text
+//! e = 1 - g / G,      d ln(e) / d(l / G) = -(1 - (1 - e)^n) / e,      between -1 at e = 1 and -n at e = 0
+//! ```
+//!
+//! All numbers carry their derivatives ([`Jet`]), which are therefore those of the numerical solution.
 //!
 //! A z that turns back between two samples goes by way of its [turning point](turning_point).
 //!
@@ -31,10 +37,19 @@ type Number = Jet<7>;
 
 /// Largest `n k g^(n-1) l` of one step of Runge and Kutta: its error is of the order of the fifth power.
 const STIFF: f64 = 0.05;
-/// Most steps of one part of a change. Beyond, the force has reached its limit long before the end.
+/// `n k g^(n-1) l` of a loading beyond which the missing part is integrated instead.
+const LONG: f64 = 0.5;
+/// Most steps of one part of a change.
 const STEPS: f64 = 100.0;
-/// Fewest steps.
+/// Fewest steps where the force passes zero, where g^n bends.
 const FEWEST: f64 = 3.0;
+/// Steps of the missing part: longest n l / G, longest part of g / G, and the shortest l / G at g = 0.
+const LONGEST: f64 = 0.3;
+const GROWTH: f64 = 0.3;
+const FIRST: f64 = 0.01;
+/// A missing part whose rate of decay is taken as constant, and one whose rate is that of the series to the second power.
+const NEGLIGIBLE: f64 = 1e-7;
+const SMALL: f64 = 1e-4;
 /// Nodes `x^2` and weights `2 x w` of Gauss's quadrature of `2 x f(x^2)` from 0 to 1, where f bends like a power at zero.
 const NODES: [(f64, f64); 8] = [
     (0.000_394_223_874_247, 0.002_009_899_851_318),
@@ -125,7 +140,12 @@ impl Law {
         let n = self.exponent.value;
         let most = size.value.max(size.value + direction * length.value);
         let stiff = n * k.value.abs() * most.max(0.0).powf(n - 1.0) * length.value;
-        let steps = (stiff / STIFF).min(STEPS - 1.0).floor() + FEWEST;
+        if stiff > LONG && direction > 0.0 && k.value > 0.0 {
+            return self.approached(size, length, k);
+        }
+        let least = size.value.min(size.value + direction * length.value);
+        let fewest = if least > length.value { 1.0 } else { FEWEST };
+        let steps = (stiff / STIFF).min(STEPS - 1.0).floor() + fewest;
         // shortest near zero, where g^n bends
         let part = |step: f64| if direction > 0.0 { step } else { steps - 1.0 - step };
         let slope = |g: Number| {
@@ -143,6 +163,40 @@ impl Law {
             g = g + h * (first + (second + third) * 2.0 + last) * (1.0 / 6.0);
         }
         g
+    }
+
+    /// The same of a long loading, which approaches a limit: the missing part is integrated.
+    fn approached(&self, size: Number, length: Number, k: Number) -> Number {
+        let (one, n) = (Number::constant(1.0), self.exponent);
+        let limit = k.power(-n.recip());
+        let scale = limit.recip();
+        let rate = |missing: Number| {
+            if missing.value.abs() < SMALL {
+                let second = n * (n - one) * 0.5;
+                let third = second * (n - one * 2.0) * (1.0 / 3.0);
+                return n - second * missing + third * missing * missing;
+            }
+            (one - (one - missing).power(n)) * missing.recip()
+        };
+        let (mut missing, mut left) = (one - size * scale, length * scale);
+        while left.value > 0.0 {
+            let reached = (1.0 - missing.value).max(0.0);
+            let longest = (GROWTH * reached + FIRST).min(LONGEST / n.value.max(1.0));
+            let is_last = missing.value.abs() < NEGLIGIBLE || longest >= left.value;
+            let step = if is_last { left } else { Number::constant(longest) };
+            let first = rate(missing);
+            let mut decay = first;
+            if missing.value.abs() >= NEGLIGIBLE {
+                let after = |part: f64, rate: Number| missing * (-(step * rate * part)).exp();
+                let second = rate(after(0.5, first));
+                let third = rate(after(0.5, second));
+                let last = rate(after(1.0, third));
+                decay = (first + (second + third) * 2.0 + last) * (1.0 / 6.0);
+            }
+            missing = missing * (-(step * decay)).exp();
+            left = left - step;
+        }
+        limit * (one - missing)
     }
 }
 
