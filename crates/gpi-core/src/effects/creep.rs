@@ -95,10 +95,14 @@ impl Block for Creep {
         times.chain(self.gains.iter().map(|_| 1e-3)).collect()
     }
 
-    /// Creep follows the motion, and is smaller: the gains add up to more than 0 and less than 1.
+    /// Creep follows the motion, and is smaller: the gains add up to more than 0 and less than 1. Lags of the other direction, which
+    /// a fit may bring beside one that is hardly faster, are a small part.
     fn is_possible(&self) -> bool {
+        /// Of the gains of the other direction over the whole. By hand.
+        const AGAINST: f64 = 0.5;
         let total: f64 = self.gains.iter().sum();
-        total > 0.0 && total < 1.0
+        let against: f64 = -self.gains.iter().filter(|gain| **gain < 0.0).sum::<f64>();
+        total > 0.0 && total < 1.0 && against <= AGAINST * total
     }
 
     /// All lags relax in one direction, and none is slower than the record, which would be a trend.
@@ -190,6 +194,19 @@ mod tests {
         assert!(creep(&[0.2], &[-0.03]).is_plausible(20.0));
         assert!(!creep(&[0.2, 3.0], &[0.03, -0.01]).is_plausible(20.0));
         assert!(!creep(&[0.2, 375.0], &[0.03, 0.01]).is_plausible(20.0));
+    }
+
+    #[test]
+    fn creep_does_not_come_from_lags_against_each_other() {
+        let is_possible = |gains: &[f64]| {
+            let times = vec![0.5; gains.len()];
+            Creep { input: 0, time_constants: times, gains: gains.to_vec(), dead_time: 0 }.is_possible()
+        };
+        assert!(is_possible(&[0.03, 0.01]));
+        assert!(is_possible(&[0.03, -0.005]));
+        assert!(!is_possible(&[0.03, -0.02]));
+        assert!(!is_possible(&[-0.03]));
+        assert!(!is_possible(&[1.1]));
     }
 
     #[test]

@@ -251,9 +251,9 @@ settings! {
         /// from the noise. On records of known truth false ones left 0.10 to 0.6, true forces of one element at most 0.042; sums
         /// of elements left up to 0.4 and are then not named.
         left: f64 = 0.05, PART;
-        /// The same of a gap that a force passes. By hand: a bank of stops with positive weights cannot follow a gap, so that
-        /// most of the squares are the gap's.
-        left_by_gap: f64 = 0.5, PART;
+        /// The same of a gap that a force passes, and of creep. By hand: most of the squares are their own. A bank of stops with positive
+        /// weights cannot follow a gap.
+        left_at_most: f64 = 0.5, PART;
         /// The same of a slow function of time: it must be three times what is left, because it can follow any slow error. By hand.
         left_by_slow: f64 = 0.1, PART;
         /// Part by which the squares must fall for the model without a refused effect to be taken instead of the present one:

@@ -18,6 +18,7 @@
 //!   than a part of the squares of the balance of forces ([`crate::explain::force_balance`]);
 //! - a slow function of time, because it can follow any slow error, unless it leaves no more than a part of the squares of the best model
 //!   without it and the output does not integrate the input: an integral of errors is slow;
+//! - creep, unless it leaves no more than a part of the squares of the best model without it;
 //! - a hysteretic force in such a loop that leaves more than a part of the squares of the best model without it, because it
 //!   resembles a hysteresis before the dynamics.
 //!
@@ -65,7 +66,7 @@ pub(super) fn doubt(
     } else if let Place::Output(own) = of
         && own.is_pinched()
     {
-        let is_weak = state.cost > policy.left_by_gap * state.best_without(place, progress)?.1;
+        let is_weak = state.cost > policy.left_at_most * state.best_without(place, progress)?.1;
         Ok(is_weak.then_some(Refusal::ResemblesMisfit))
     } else if matches!(of, Place::Widths(_) | Place::Output(_)) {
         Ok(Some(Refusal::ResemblesMisfit))
@@ -86,6 +87,9 @@ pub(super) fn doubt(
         let follows = state.integrates()?
             || state.cost > policy.left_by_slow * state.best_without(place, progress)?.1;
         Ok(follows.then_some(Refusal::FollowsTheRest))
+    } else if let Place::Parallel(_) = of {
+        let is_weak = state.cost > policy.left_at_most * state.best_without(place, progress)?.1;
+        Ok(is_weak.then_some(Refusal::Insubstantial))
     } else {
         Ok(None)
     }
