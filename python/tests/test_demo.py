@@ -52,6 +52,7 @@ def test_the_demonstration_names_what_was_put_in(shown: Demonstration) -> None:
     assert result["left"]["lag1"] > 0.5
 
 
+@pytest.mark.slow
 def test_where_the_input_hardly_is_the_model_stays_plausible() -> None:
     """Only the half that is not scored reaches the largest inputs, for nine samples."""
     record = gpi.read_record(DATA / "demo.csv.gz")

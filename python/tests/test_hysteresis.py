@@ -419,7 +419,9 @@ def test_one_sine_supports_a_gain_and_a_delay(sine_record):
     assert oracle.errors(truth[:-3], model.simulate(smaller)[3:])["nrmse"] < 0.015
 
 
-@pytest.mark.parametrize(("unit_u", "unit_y"), UNITS)
+@pytest.mark.parametrize(
+    ("unit_u", "unit_y"), [UNITS[0], *(pytest.param(*units, marks=pytest.mark.slow) for units in UNITS[1:])]
+)
 def test_units_do_not_move_the_delay(unit_u, unit_y):
     v, _ = oracle.gpi(SINE, THRESHOLDS, SLOPES, HALF_WIDTHS, WEIGHTS)
     y = np.concatenate([np.zeros(3), v[:-3]])
