@@ -10,11 +10,12 @@
 //!    significant and the held-out blocks confirm it (`judgement`), and if what it does is its own
 //!    (`examination`). Effects that it makes superfluous are dropped (`revision`).
 //! 4. Steps 2 and 3 are repeated until no effect is accepted. Then an effect that the input drives replaces a slow
-//!    function of time that it explains as well, and the residual is tested for remaining structure (`residual`).
+//!    function of time that it explains as well, forces inside the mechanics enter where the input does if that explains nearly as
+//!    much (`force_at_input`), and the residual is tested for remaining structure (`residual`).
 //!
 //! The files import in one direction only: `policy` (every tolerance), `judgement`, `base`, `projection`,
 //! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `trial`,
-//! `examination`, `grid`, `revision`, `search`, `outside` (why the structure is wrong), `explanation`.
+//! `examination`, `grid`, `revision`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
 
 pub(crate) mod base;
 mod blocks;
@@ -22,6 +23,7 @@ mod concurrently;
 mod examination;
 mod exchange;
 mod explanation;
+mod force_at_input;
 mod force_balance;
 mod forces;
 mod grid;

@@ -272,8 +272,9 @@ settings! {
         /// Factor by which the held-out squares may grow without a superfluous effect. The few held-out blocks
         /// vary; the training data decide. By hand.
         superfluous: f64 = 1.5, FROM_ONE;
-        /// Part by which all squares may grow without a section of G that stands beside a mode with a loop: 2.5 % of the error.
-        /// Far from the noise, what explains so little may stand for anything, and it takes a share of the force. By hand.
+        /// Part by which all squares may grow without a section of G that stands beside a mode with a loop, without a hysteresis before
+        /// such a loop, or where forces enter with the input: 2.5 % of the error. Far from the noise, what explains so little may
+        /// stand for anything, and it takes a share of the force. By hand.
         section: f64 = 0.05, PART;
         /// Factor by which the held-out squares may grow when a driven effect replaces a slow function of time. By hand.
         driven_instead: f64 = 1.05, FROM_ONE;

@@ -6,7 +6,7 @@
 //! | decision | condition |
 //! |---|---|
 //! | an effect is superfluous | `lost` < threshold of the newest effect, and `T_without < f T_with` |
-//! | the hysteresis is superfluous beside a loop around G | `lost` < q ln N for its q parameters, and `T_without < f T_with` |
+//! | the hysteresis is superfluous beside a loop around G | `lost` < q ln N for its q parameters, and `T_without < f T_with`; or, far from the noise, `J_without <= (1 + f) J`, and `T_without <= (1 + f) T` |
 //! | a section of G without resonance is superfluous beside a loop | `J_without <= (1 + f) J`, and `T_without <= (1 + f) T` |
 //! | an added signal moves to the other side of the output stage | `J_moved < (1 - f) J` |
 //! | a slow function of time is replaced | see [`super::exchange`] |
@@ -96,7 +96,13 @@ pub(super) fn straighten(state: &mut SearchState, progress: Progress) -> Result<
     let lost = state.prepared.values() * (fitted.linearization.cost / state.cost).ln();
     let now = state.held_out(&state.point)?;
     let then = state.held_out(&fitted.point)?;
-    if is_superfluous(lost, price, [&now, &then], state.setup.policy.revision.superfluous) {
+    let policy = &state.setup.policy;
+    let is_far = state.cost > policy.judgement.near_noise * state.noise_squares()?;
+    let most = 1.0 + policy.revision.section;
+    let explains_little = is_far
+        && fitted.linearization.cost <= most * state.cost
+        && then.iter().sum::<f64>() <= most * now.iter().sum::<f64>();
+    if explains_little || is_superfluous(lost, price, [&now, &then], policy.revision.superfluous) {
         (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
     }
     Ok(())

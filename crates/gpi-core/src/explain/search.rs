@@ -2,6 +2,7 @@
 
 use super::examination::{doubt, examine};
 use super::exchange::{exchange_slow, prefer_driven};
+use super::force_at_input::enter_with_input;
 use super::forces::{Balanced, balanced, forces};
 use super::grid::refine_grids;
 use super::judgement::{Evidence, Refusal, choose, judge, refusal};
@@ -36,7 +37,8 @@ pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Err
     if settle_lags(state)? {
         examine_all(state, progress)?;
     }
-    Ok(())
+    enter_with_input(state, progress)?;
+    straighten(state, progress)
 }
 
 /// Adds effects until nothing more is confirmed.

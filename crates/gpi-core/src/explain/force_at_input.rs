@@ -1,0 +1,120 @@
+//! Forces inside the mechanics that enter where the input does.
+//!
+//! A loop drives the states of G by a column E of its own, as many numbers as G has states. Where w is a force on the mass that the
+//! input moves, one number is enough: `E = -f b` with the column b by which the input enters ([`Drives::Input`]). Numbers that
+//! the data hardly determine move the force in steady state, which is printed in physical terms. A model in which all forces enter
+//! with the input is therefore taken where it explains nearly as much: with J the training squares and T the held-out ones,
+//!
+//! ```text
+//! J_input <= (1 + p) J,      T_input <= (1 + p) T,
+//! ```
+//!
+//! for the part p that a section of G beside such a force must explain ([`super::policy`]). It begins at the same force in steady state,
+//! and with either hold of v between samples where loops take several steps.
+
+use super::state::SearchState;
+use crate::Error;
+use crate::chain::point::Point;
+use crate::effects::{Drives, InnerLoop};
+use crate::progress::Progress;
+use crate::{Hold, Intersample};
+
+/// Lets all forces inside the mechanics enter where the input does, if that explains nearly as much.
+pub(super) fn enter_with_input(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
+    let Some(point) = with_input(&state.point) else { return Ok(()) };
+    let present = point.intersample;
+    let holds = if present.is_plain() { vec![present.hold] } else { vec![Hold::First, Hold::Zero] };
+    let squares = |point: &Point| Ok::<f64, Error>(state.held_out(point)?.iter().sum());
+    let most = 1.0 + state.setup.policy.revision.section;
+    let [train, held_out] = [most * state.cost, most * squares(&state.point)?];
+    let mut best: Option<(Point, f64)> = None;
+    for hold in holds {
+        let mut point = point.clone();
+        point.intersample = Intersample { hold, ..present };
+        let fitted = state.fit(point, &state.setup.options, "rearrangement", progress)?;
+        let (point, cost) = (fitted.point, fitted.linearization.cost);
+        let least = best.as_ref().map_or(train, |&(_, cost)| cost);
+        if cost <= least && squares(&point)? <= held_out {
+            best = Some((point, cost));
+        }
+    }
+    if let Some(best) = best {
+        (state.point, state.cost) = best;
+    }
+    Ok(())
+}
+
+/// The point in which every loop drives what its input drives, with the same force in steady state; `None` where all do, where there is
+/// no such force, or where there are several inputs or outputs.
+fn with_input(point: &Point) -> Option<Point> {
+    let is_single = point.channels.len() == 1 && point.dynamics.outputs() == 1;
+    let is_own = |inner: &InnerLoop| matches!(inner.drives, Drives::States(_));
+    if !is_single || !point.loops().any(is_own) {
+        return None;
+    }
+    let states = point.dynamics.order();
+    let over_stiffness = |inner: &InnerLoop| Some(point.steady_force(inner)?.over_stiffness);
+    let force = |inner: &InnerLoop| {
+        let drives = Drives::Input { input: 0, force: 1.0, states };
+        Some(over_stiffness(inner)? / over_stiffness(&InnerLoop { drives, ..inner.clone() })?)
+    };
+    let forces: Vec<f64> = point.loops().map(force).collect::<Option<_>>()?;
+    if !forces.iter().all(|force| force.is_finite()) {
+        return None;
+    }
+    let mut moved = point.clone();
+    for (inner, force) in moved.loops_mut().zip(forces) {
+        inner.drives = Drives::Input { input: 0, force, states };
+    }
+    Some(moved)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::hysteresis::Parameters;
+    use crate::chain::point::Past;
+    use crate::effects::{Effect, Law, Sees, Stiffness};
+    use crate::linear::{Sections, TransferFunction};
+    use crate::operators::Reading;
+    use crate::{Intersample, Matrix};
+    use nalgebra::DVector;
+
+    /// A resonance behind a dead time, with a cubic force and a damping.
+    fn point(intersample: Intersample) -> Point {
+        let resonance = TransferFunction::new(&[0.3, 0.1], &[1.0, -1.6, 0.8]).unwrap();
+        let system = resonance.to_state_space().unwrap();
+        let around = |law, drives: [f64; 2]| InnerLoop {
+            sees: Sees::Output(0),
+            law,
+            drives: Drives::States(drives.to_vec()),
+        };
+        let cubic = Law::Power { exponent: 3, scale: 0.5 };
+        let loops =
+            vec![around(cubic, [-0.04, -0.03]), around(Law::Damping { scale: 0.1 }, [0.01, 0.03])];
+        Point {
+            pasts: vec![Past { plays: None, has_unknown_state: false, state: DVector::zeros(2) }],
+            channels: vec![Parameters::identity(Reading::OneSided, vec![0.0], vec![0.0])],
+            dynamics: Sections::from_state_space(&system, 2).unwrap(),
+            intersample,
+            effects: vec![Effect::from(Stiffness { loops })],
+            rate: 1e3,
+            offsets: vec![Matrix::zeros(1, 1)],
+        }
+    }
+
+    #[test]
+    fn the_force_in_steady_state_is_kept() {
+        let fine = Intersample { substeps: 4, hold: Hold::First };
+        for intersample in [Intersample::default(), fine] {
+            let point = point(intersample);
+            let moved = with_input(&point).unwrap();
+            assert!(with_input(&moved).is_none());
+            for (before, after) in point.loops().zip(moved.loops()) {
+                let of = |point: &Point, inner| point.steady_force(inner).unwrap().over_stiffness;
+                let [before, after] = [of(&point, before), of(&moved, after)];
+                assert!((before - after).abs() < 1e-12 * before.abs(), "{before} {after}");
+            }
+        }
+    }
+}
