@@ -38,15 +38,15 @@ type Number = Jet<7>;
 /// Largest `n k g^(n-1) l` of one step of Runge and Kutta: its error is of the order of the fifth power.
 const STIFF: f64 = 0.05;
 /// `n k g^(n-1) l` of a loading beyond which the missing part is integrated instead.
-const LONG: f64 = 0.5;
+const LONG: f64 = 1.0;
 /// Most steps of one part of a change.
 const STEPS: f64 = 100.0;
-/// Fewest steps where the force passes zero, where g^n bends.
+/// Fewest steps: g^n bends near zero.
 const FEWEST: f64 = 3.0;
 /// Steps of the missing part: longest n l / G, longest part of g / G, and the shortest l / G at g = 0.
-const LONGEST: f64 = 0.3;
+const LONGEST: f64 = 0.2;
 const GROWTH: f64 = 0.3;
-const FIRST: f64 = 0.01;
+const FIRST: f64 = 0.001;
 /// A missing part whose rate of decay is taken as constant, and one whose rate is that of the series to the second power.
 const NEGLIGIBLE: f64 = 1e-7;
 const SMALL: f64 = 1e-4;
@@ -143,9 +143,7 @@ impl Law {
         if stiff > LONG && direction > 0.0 && k.value > 0.0 {
             return self.approached(size, length, k);
         }
-        let least = size.value.min(size.value + direction * length.value);
-        let fewest = if least > length.value { 1.0 } else { FEWEST };
-        let steps = (stiff / STIFF).min(STEPS - 1.0).floor() + fewest;
+        let steps = (stiff / STIFF).min(STEPS - 1.0).floor() + FEWEST;
         // shortest near zero, where g^n bends
         let part = |step: f64| if direction > 0.0 { step } else { steps - 1.0 - step };
         let slope = |g: Number| {
