@@ -54,13 +54,14 @@ fn add_effects(state: &mut SearchState, progress: Progress) -> Result<(), Error>
 }
 
 /// Examines every effect once more, now that the model is whole; drops what does not pass, which is not tried again, and
-/// says whether there was any.
+/// says whether there was any. Slow functions of time come first: beside one that follows an error of the model, an effect that
+/// the error belongs to has no part of its own.
 fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let before = state.refused.len();
-    let mut place = 0;
-    while place < state.point.effects.len() {
+    let mut passed = 0;
+    while let Some(&place) = slow_first(state).get(passed) {
         let Some(why) = doubt(state, place, progress)? else {
-            place += 1;
+            passed += 1;
             continue;
         };
         let entry = state.point.effects[place].entry();
@@ -70,14 +71,23 @@ fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
         let (effect, confounded_with) = (entry.name, Vec::new());
         let probability = None;
         state.refused.push(Rejected { effect, holdout_rms, why, confounded_with, probability });
-        if let Some(own) = state.additions.iter().rposition(|one| one.trial.entry.name == effect) {
-            state.additions.remove(own);
+        if !state.has(entry) {
+            state.additions.retain(|one| one.trial.entry.name != effect);
         }
         state.repair()?;
         // the others may have depended on it
-        place = 0;
+        passed = 0;
     }
     Ok(state.refused.len() > before)
+}
+
+/// The places of all effects, those of slow functions of time first.
+fn slow_first(state: &SearchState) -> Vec<usize> {
+    let effects = &state.point.effects;
+    let is_slow = |place: &usize| effects[*place].entry().signature == Signature::SlowInTime;
+    let (mut first, rest): (Vec<usize>, Vec<usize>) = (0..effects.len()).partition(is_slow);
+    first.extend(rest);
+    first
 }
 
 /// One round: takes the best effect, if any is confirmed; says whether the model became another.

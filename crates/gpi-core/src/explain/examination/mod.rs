@@ -12,7 +12,8 @@
 //! nonsense of the answers.
 //!
 //! 3. *Its own part*: what it adds to the output differs from all that the rest of the model can do ([`own_part`]), or a fit
-//!    without it leaves more than the noise. The latter does not count for a slow function of time.
+//!    without it leaves more than the noise. The latter does not count for a slow function of time. A force inside the mechanics of a
+//!    stage that integrates its input is not asked: the error of a simulation is there the sum of all small forces.
 //! 4. *Slow*: a slow function of time is slower than the lags of G, and predicts gaps between its knots as well as it fits
 //!    ([`gaps`]).
 //! 5. *Small, or at the noise*: an effect that is a large part of the output, acts a few times only, or acts like a misfit
@@ -96,8 +97,12 @@ pub(super) fn doubt(
         return Ok(Some(Refusal::Saturates));
     }
     let is_slow = point.effects[place].entry().signature == Signature::SlowInTime;
+    // where the output integrates the input, forces are judged by their balance
+    let is_balanced =
+        matches!(point.effects[place].place(), Place::Loops(_)) && state.integrates()?;
     // what a slow function of time does beyond the bounds of a slower creep, for example, says nothing of its cause
-    if !own_part::is_beyond_chance(state, point, place, state.cost)?
+    if !is_balanced
+        && !own_part::is_beyond_chance(state, point, place, state.cost)?
         && (is_slow || !is_needed(state, place, progress)?)
     {
         return Ok(Some(Refusal::NotItsOwn));
