@@ -177,7 +177,11 @@ impl Block for Covariate {
             quantities.push(Quantity::new("time_constant", "s", self.time_constant));
         }
         if self.count() > 2 {
-            quantities.push(Quantity::new(format!("start of {}", self.label), &self.label, self.start));
+            quantities.push(Quantity::new(
+                format!("start of {}", self.label),
+                &self.label,
+                self.start,
+            ));
         }
         quantities
     }

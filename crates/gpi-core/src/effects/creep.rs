@@ -200,7 +200,8 @@ mod tests {
     fn creep_does_not_come_from_lags_against_each_other() {
         let is_possible = |gains: &[f64]| {
             let times = vec![0.5; gains.len()];
-            Creep { input: 0, time_constants: times, gains: gains.to_vec(), dead_time: 0 }.is_possible()
+            Creep { input: 0, time_constants: times, gains: gains.to_vec(), dead_time: 0 }
+                .is_possible()
         };
         assert!(is_possible(&[0.03, 0.01]));
         assert!(is_possible(&[0.03, -0.005]));
