@@ -47,6 +47,8 @@ const FEWEST: f64 = 3.0;
 const LONGEST: f64 = 0.2;
 const GROWTH: f64 = 0.3;
 const FIRST: f64 = 0.001;
+/// Most steps of the missing part: beyond, it is no number, or its law is none.
+const MOST: usize = 200;
 /// A missing part whose rate of decay is taken as constant, and one whose rate is that of the series to the second power.
 const NEGLIGIBLE: f64 = 1e-7;
 const SMALL: f64 = 1e-4;
@@ -177,14 +179,17 @@ impl Law {
             (one - (one - missing).power(n)) * missing.recip()
         };
         let (mut missing, mut left) = (one - size * scale, length * scale);
+        let mut steps = 0;
         while left.value > 0.0 {
+            steps += 1;
             let reached = (1.0 - missing.value).max(0.0);
             let longest = (GROWTH * reached + FIRST).min(LONGEST / n.value.max(1.0));
-            let is_last = missing.value.abs() < NEGLIGIBLE || longest >= left.value;
+            let is_missed = missing.value.abs() >= NEGLIGIBLE;
+            let is_last = !is_missed || steps == MOST || longest >= left.value;
             let step = if is_last { left } else { Number::constant(longest) };
             let first = rate(missing);
             let mut decay = first;
-            if missing.value.abs() >= NEGLIGIBLE {
+            if is_missed {
                 let after = |part: f64, rate: Number| missing * (-(step * rate * part)).exp();
                 let second = rate(after(0.5, first));
                 let third = rate(after(0.5, second));
@@ -244,6 +249,17 @@ mod tests {
         // Dahl: the force ends at 1 / beta
         let shape = Shape { beta: 4.0, gamma: 0.0, exponent: 1.0 };
         assert!((changed(0.0, 12.0, shape) - 0.25).abs() < 1e-9);
+    }
+
+    #[test]
+    fn nonsense_takes_no_longer() {
+        for (beta, exponent) in [(1e6, 400.0), (1e300, 1e300), (1e-300, 1e12), (2.0, f64::NAN)] {
+            let shape = Shape { beta, gamma: 0.0, exponent };
+            for (force, dz) in [(1e9, 1e12), (0.0, 1e300), (-1e300, 1e200), (f64::NAN, 1.0)] {
+                // whatever it is
+                let _ = changed(force, dz, shape);
+            }
+        }
     }
 
     #[test]
