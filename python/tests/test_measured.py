@@ -32,7 +32,6 @@ def show(capsys: pytest.CaptureFixture[str], text: str) -> None:
         print(f"\n    {text}")
 
 
-@pytest.mark.slow
 def test_piezo_stack_on_another_experiment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = MEASURED / "piezo-p885-dbo"
     found = call(capsys, "identify", folder / "model_1hz_fullscale.csv", "-o", tmp_path / "p885")

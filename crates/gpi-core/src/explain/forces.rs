@@ -17,7 +17,8 @@ use crate::progress::Progress;
 use crate::{Error, Experiment, Matrix};
 
 /// The best force of each effect that acts inside the mechanics, with the model to begin at. None where the model has such a force, or the
-/// part of the squares that another effect promises brings it near the noise. The balance depends on the record alone, so that it is
+/// part of the squares that another effect promises brings it near the noise, or where the input repeats one cycle, whose shape any force
+/// can take. The balance depends on the record alone, so that it is
 /// asked once beside the same other effects.
 pub(super) fn forces(
     state: &mut SearchState,
@@ -36,7 +37,8 @@ pub(super) fn forces(
     let is_free = moving.half_widths && moving.thresholds && !state.setup.order_is_given;
     let left = (1.0 - promised) * state.cost;
     let is_near = left <= policy.judgement.near_noise * state.noise_squares()?;
-    if !is_single || !is_free || is_near || state.point.loops().next().is_some() {
+    let is_pointless = state.setup.is_one_sine || state.point.loops().next().is_some();
+    if !is_single || !is_free || is_near || is_pointless {
         return Ok(Vec::new());
     }
     let straight = state.point.without_hysteresis(record);
