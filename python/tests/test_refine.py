@@ -129,7 +129,7 @@ def assumed(model, found, plant, experiments):
     return described.with_values(names)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=14, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     poles=st.sampled_from(sorted(POLES)),

@@ -57,6 +57,17 @@ impl Covariate {
     pub(super) const EXPLAINS_AUTOCORRELATION: bool = false;
     pub(super) const IS_EXPANSION: bool = false;
 
+    /// How many values are estimated: a column without a lag has no start, and one whose range is unknown is held.
+    fn count(&self) -> usize {
+        if self.time_constant <= 0.0 {
+            1
+        } else if self.range <= 0.0 {
+            2
+        } else {
+            3
+        }
+    }
+
     pub(super) fn proposals(situation: &Situation) -> Vec<Proposal<Self>> {
         let shortest = 1.0 / situation.record.rate();
         let longest = 0.3 * situation.duration();
@@ -97,19 +108,6 @@ impl Covariate {
             }
         }
         found
-    }
-}
-
-impl Covariate {
-    /// How many values are estimated: a column without a lag has no start, and one whose range is unknown is held.
-    fn count(&self) -> usize {
-        if self.time_constant <= 0.0 {
-            1
-        } else if self.range <= 0.0 {
-            2
-        } else {
-            3
-        }
     }
 }
 

@@ -177,7 +177,7 @@ impl Refusal {
                 "is a function of time that changes as fast as the dynamics, and may follow what they lack".to_owned()
             }
             Self::FollowsTheRest => {
-                "is a function of time that may follow what the model lacks, whose error would still be far above the noise".to_owned()
+                "is a function of time that may follow what the model lacks: the error of the model would still be far above the noise".to_owned()
             }
             Self::NoResonance => "would act inside a mechanical loop, and the dynamics have no resonance".to_owned(),
             Self::LongerFit => "reduces the error no more than a longer fit of the model without it".to_owned(),
