@@ -62,10 +62,19 @@ impl Between {
         if loops.is_empty() {
             return Self::default();
         }
-        let behind = Sections { delay: 0, ..dynamics.clone() };
-        let found = behind.to_state_space().ok();
-        let found = found.and_then(|system| Self::new(&system, &loops, intersample));
+        let found = Self::around(dynamics, &loops, intersample);
         found.unwrap_or_else(|| Self::nowhere(dynamics, loops.len(), intersample))
+    }
+
+    /// Loops around the sections of G; `None` where A has no logarithm.
+    pub(crate) fn around(
+        dynamics: &Sections,
+        loops: &[&InnerLoop],
+        intersample: Intersample,
+    ) -> Option<Self> {
+        let behind = Sections { delay: 0, ..dynamics.clone() };
+        let system = behind.to_state_space().ok()?;
+        Self::new(&system, loops, intersample)
     }
 
     /// Loops around a G without its dead time; `None` where A has no logarithm.

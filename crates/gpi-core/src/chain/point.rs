@@ -13,7 +13,7 @@
 //! parallel with G, in the order of the chain. Methods that insert or remove an effect splice the segment of every
 //! experiment, so that the other initial states keep their values.
 
-use crate::chain::between::held_inputs;
+use crate::chain::between::{Between, held_inputs};
 use crate::chain::hysteresis::{Elements, Parameters};
 use crate::chain::sensitivity::Derivatives;
 use crate::effects::{
@@ -153,6 +153,13 @@ impl Point {
         let more = point.dynamics.order() - own;
         point.loops_mut().for_each(|inner| inner.add_states(more));
         point
+    }
+
+    /// Whether G has a motion between the samples, where loops are computed in several steps from one to the next: no pole of
+    /// it is zero or negative.
+    pub(crate) fn moves_between_samples(&self) -> bool {
+        let loops: Vec<_> = self.loops().collect();
+        loops.is_empty() || Between::around(&self.dynamics, &loops, self.intersample).is_some()
     }
 
     /// The point without a section of G, whose DC gain D takes where it is held.

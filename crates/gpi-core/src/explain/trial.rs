@@ -30,7 +30,7 @@ use super::state::{SearchState, Trial};
 use crate::Error;
 use crate::Progress;
 use crate::chain::point::Point;
-use crate::effects::{ClosedLoops, Effect, Entry, FreeOrder, Stage};
+use crate::effects::{ClosedLoops, Entry, FreeOrder, Stage};
 use crate::fit::joint::Refined;
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::fit::preparation::rescale;
@@ -164,11 +164,17 @@ pub(super) fn start(state: &SearchState, base: &Point, score: Score) -> Result<P
     Ok(if is_sensible && is_near { start } else { base.with_effect(zero) })
 }
 
-/// Makes modes that were found parts of G.
+/// Makes modes that were found parts of G. One with a pole that no motion between the samples has stays beside G where loops
+/// are computed in several steps a sample.
 pub(super) fn join_modes(point: &mut Point) {
-    let joins = |effect: &Effect| effect.entry().free_order == FreeOrder::JoinsG;
-    while let Some(place) = point.effects.iter().position(joins) {
-        *point = point.with_effect_in_dynamics(place);
+    let mut place = 0;
+    while place < point.effects.len() {
+        let joins = point.effects[place].entry().free_order == FreeOrder::JoinsG;
+        let joined = joins.then(|| point.with_effect_in_dynamics(place));
+        match joined.filter(Point::moves_between_samples) {
+            Some(joined) => *point = joined,
+            None => place += 1,
+        }
     }
     rescale(point);
 }
@@ -242,6 +248,29 @@ fn makes_progress(status: Status, history: &[f64], cost: f64, policy: &FitPolicy
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::hysteresis::Parameters;
+    use crate::chain::looped::{fine, record, run};
+    use crate::effects::LinearDynamics;
+    use crate::fit::preparation::Prepared;
+
+    #[test]
+    fn a_mode_without_motion_between_samples_stays_beside_the_dynamics() {
+        let model = fine();
+        let record = record(&model, vec![run(1.5, 0.0, 130, vec![])]);
+        let channels = model.hysteresis().iter().map(Parameters::from_operator).collect();
+        let point = Prepared::new(&record, channels).unwrap().point_of(&model).unwrap();
+        let stays = |denominator: [f64; 2]| {
+            let (denominator, numerator) = (denominator.to_vec(), vec![0.1, 0.05]);
+            let mode =
+                LinearDynamics { input: 0, denominator, numerator, rate: 100.0, dead_time: 2 };
+            let mut own = point.with_effect(mode.into());
+            join_modes(&mut own);
+            own.effects.len() > point.effects.len()
+        };
+        assert!(!stays([-1.6, 0.8]));
+        // poles at 0.5 and -0.4
+        assert!(stays([-0.1, -0.2]));
+    }
 
     #[test]
     fn a_fit_goes_on_where_its_last_steps_were_long() {

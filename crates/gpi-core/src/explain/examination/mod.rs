@@ -142,6 +142,10 @@ fn is_mode(state: &SearchState, trial: &Trial) -> Result<bool, Error> {
     }
     let mut joined = trial.point.clone();
     join_modes(&mut joined);
+    if joined.effects.iter().any(|effect| effect.entry().free_order == FreeOrder::JoinsG) {
+        // no continuous motion has its poles
+        return Ok(false);
+    }
     let record = &state.prepared.record;
     let memory = Memory::of(record);
     let slow = |point: &Point| memory.exceeded_by(point, &state.prepared);
