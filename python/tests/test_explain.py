@@ -111,6 +111,19 @@ def test_loops_that_open_with_speed_are_fitted_on_grids_that_move():
     assert found.after["holdout"]["rms"] < 1.1 * plant.noise_std
 
 
+@pytest.mark.slow
+def test_an_effect_that_is_smaller_than_coloured_noise_is_named():
+    # white noise of the same size would hide the sensor's curve; the past of this noise predicts most of it
+    lacking = ("backlash", "coloured-noise", "output-nonlinearity")
+    plant = plants.draw(1068, lacking, 30.0, 30.0)
+    found = gpi.explain(record_of(plant.record(0)))
+    assert sorted(found.effects) == sorted(lacking) and found.verdict == "explained"
+    # the noise remains, and no more
+    assert found.after["train"]["rms"] == pytest.approx(30.0 * plant.noise_std, rel=0.02)
+    sizes = [(step["train_rms"], step["holdout_rms"]) for step in found.steps]
+    assert all(0.9 < train / holdout < 1.1 for train, holdout in sizes)
+
+
 def test_creep_is_named_where_samples_are_too_slow_to_show_dynamics():
     rate, random = 10.0, np.random.default_rng(1)
     levels = np.repeat(random.uniform(0.0, 10.0, 60), 50)

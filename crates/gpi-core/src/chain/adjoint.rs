@@ -45,7 +45,7 @@ use super::between::{Between, Row};
 use super::injections::{Injection, Places, injections};
 use super::motion::{advance_adjoint, columns, rows};
 use super::point::{Freedom, Point};
-use super::stream::Stream;
+use super::stream::{Stream, begins};
 use super::table::{Group, Table};
 use super::tangents::{Trace, memories, sensed};
 use crate::effects::{InnerLoop, Sees, Slope};
@@ -97,15 +97,11 @@ fn descent_of(
 ) -> Result<(DVector<f64>, f64), Error> {
     let mut stream = Stream::new(point, table, freedom.derivatives, experiment, index)?;
     let mut descent = DVector::zeros(table.len);
-    let mut cost = 0.0;
     let mut blocks = stream.traces();
-    for (trace, residuals) in &mut blocks {
-        for (mut column, k) in residuals.column_iter_mut().zip(&trace.scored) {
-            for (output, value) in column.iter_mut().enumerate() {
-                let (weight, own) = loss.of(output, *value);
-                cost += own;
-                *value *= weight;
-                let sensitivity = *value;
+    let cost = weigh(&mut blocks, loss);
+    for (trace, residuals) in &blocks {
+        for (column, k) in residuals.column_iter().zip(&trace.scored) {
+            for (output, &sensitivity) in column.iter().enumerate() {
                 stream.added(output, trace.samples.start + k, |unknown, derivative| {
                     descent[unknown] += derivative * sensitivity;
                 });
@@ -126,6 +122,33 @@ fn descent_of(
         descent[unknown] += sensitivity;
     }
     Ok((descent, cost))
+}
+
+/// Turns residuals (outputs, scored samples), block by block, into what enters the gradient by them, and returns the cost.
+fn weigh(blocks: &mut [(Trace, Matrix)], loss: &Loss) -> f64 {
+    let mut next = None;
+    let mut runs: Vec<Vec<(usize, usize)>> = Vec::new();
+    for (block, (trace, _)) in blocks.iter().enumerate() {
+        let begins = begins(trace, &mut next);
+        for column in 0..trace.scored.len() {
+            if begins.contains(&column) {
+                runs.push(Vec::new());
+            }
+            runs.last_mut().into_iter().for_each(|run| run.push((block, column)));
+        }
+    }
+    let mut cost = 0.0;
+    for output in 0..loss.scales.len() {
+        for run in &runs {
+            let value = |&(block, column): &(usize, usize)| blocks[block].1[(output, column)];
+            let mut values: Vec<f64> = run.iter().map(value).collect();
+            cost += loss.weigh(output, &mut values);
+            for (&(block, column), value) in run.iter().zip(values) {
+                blocks[block].1[(output, column)] = value;
+            }
+        }
+    }
+    cost
 }
 
 /// The chain backwards in time: what the cost makes of a change at each place.

@@ -21,12 +21,14 @@ const PARALLEL: usize = 8;
 /// Blocks by which the simulation may be ahead: their traces stay in the cache. By hand.
 const AHEAD: usize = 2;
 
-/// Residuals and derivatives of a run of scored samples of one experiment.
+/// Residuals and derivatives of a block of scored samples of one experiment.
 pub(crate) struct Rows {
     /// For each output, (unknowns, samples).
     pub regressors: Vec<Matrix>,
     /// Measured minus simulated, (outputs, samples).
     pub residuals: Matrix,
+    /// Samples of these before which samples of the experiment are left out.
+    pub begins: Vec<usize>,
 }
 
 /// Streams one experiment and hands its rows on block by block.
@@ -137,6 +139,7 @@ impl Behind<'_> {
         traces: &mut dyn Iterator<Item = (Trace, Matrix)>,
         consume: &mut dyn FnMut(Rows) -> Result<(), Error>,
     ) -> Result<(), Error> {
+        let mut next = None;
         for (trace, residuals) in traces {
             if trace.samples.end <= self.tangents_from {
                 continue;
@@ -154,7 +157,8 @@ impl Behind<'_> {
                     self.added(output, k, |unknown, derivative| row[unknown] = derivative);
                 }
             }
-            consume(Rows { regressors, residuals })?;
+            let begins = begins(&trace, &mut next);
+            consume(Rows { regressors, residuals, begins })?;
         }
         Ok(())
     }
@@ -171,4 +175,14 @@ impl Behind<'_> {
             }
         }
     }
+}
+
+/// The scored samples of a block that do not follow on the scored sample before them; `next` is the sample behind the
+/// latest scored one.
+pub(super) fn begins(trace: &Trace, next: &mut Option<usize>) -> Vec<usize> {
+    let is_new = |(_, k): &(usize, &usize)| {
+        let sample = trace.samples.start + **k;
+        next.replace(sample + 1) != Some(sample)
+    };
+    trace.scored.iter().enumerate().filter(is_new).map(|(place, _)| place).collect()
 }

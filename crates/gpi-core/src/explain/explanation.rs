@@ -4,7 +4,6 @@ use super::moved_resonance::Resonance;
 use super::noise;
 use super::outside::{Situation, outside};
 use super::residual::{self, ResidualTest};
-use super::setup::SearchSetup;
 use super::slip;
 use super::state::{Addition, Rejected, SearchState};
 use super::steps;
@@ -135,13 +134,12 @@ pub(super) fn summarise(
     let after = errors(mended, &residuals_after, &tested_after);
     let tests = residual::tests_of(&model, mended, &residuals_after)?;
     let noise: Vec<Effect> =
-        noise::effects(&state, &residuals_after, &tests, &refinement.noise_floor)?
+        noise::effects(&state, &residuals_after, &tests, &refinement.noise_floor)
             .into_iter()
             .filter(|effect| state.setup.allowed.iter().any(|entry| entry.name == effect.name()))
             .collect();
-    let values = state.prepared.values();
     let mut steps = vec![declared(&before)];
-    steps.extend(state.additions.iter().map(|one| added(one, state.setup, values)));
+    steps.extend(state.additions.iter().map(added));
     steps.extend(noise.iter().map(|effect| of_noise(effect, &after)));
     describe(&mut steps, &state.point, &refinement, &noise, &model)?;
     let found = |one: &Addition| one.trial.point.to_model(record, mended, means);
@@ -244,7 +242,7 @@ fn declared(before: &Errors) -> Step {
     }
 }
 
-fn added(addition: &Addition, setup: &SearchSetup, values: f64) -> Step {
+fn added(addition: &Addition) -> Step {
     let trial = &addition.trial;
     Step {
         effect: Some(trial.entry.name),
@@ -256,8 +254,8 @@ fn added(addition: &Addition, setup: &SearchSetup, values: f64) -> Step {
         dropped: addition.dropped.clone(),
         probability: addition.probability,
         alternatives: addition.others.iter().filter_map(probable).collect(),
-        train_rms: (trial.cost / values).sqrt(),
-        holdout_rms: setup.holdout_rms(&trial.held_out),
+        train_rms: trial.rms[0],
+        holdout_rms: trial.rms[1],
     }
 }
 

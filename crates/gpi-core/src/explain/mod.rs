@@ -19,10 +19,12 @@
 
 pub(crate) mod base;
 mod blocks;
+mod coloured;
 mod concurrently;
 mod examination;
 mod exchange;
 mod explanation;
+mod finish;
 mod force_at_input;
 mod force_balance;
 mod forces;
@@ -49,24 +51,25 @@ mod verdict;
 
 use crate::effects::OutputKind;
 use crate::fit::RefineOptions;
-use crate::fit::joint::{Refined, fit_options};
 use crate::fit::preparation::starts_at_rest;
 use crate::identify::long_record::compare;
 use crate::identify::procedure::prepare;
-use crate::identify::{Grid, IdentifyOptions, Progress, Quick, Refinement, Report};
+use crate::identify::{Grid, IdentifyOptions, Progress, Quick, Report};
 use crate::progress::{Overall, ProgressSettings};
 use crate::spectrum::is_one_sine;
 use crate::uncertainty::outliers;
 use crate::{Error, Matrix, Record};
 use explanation::summarise;
 pub use explanation::{Errors, Explanation, Step};
+use finish::finish;
 pub use moved_resonance::Resonance;
 pub use outside::{Signs, signs};
-use policy::{FitPolicy, GridPolicy, SearchPolicy};
+use policy::{GridPolicy, SearchPolicy};
 pub use residual::{ResidualOptions, ResidualTest, Significance, residual_tests};
 use setup::SearchSetup;
 pub use state::Rejected;
 use state::SearchState;
+use std::cell::OnceCell;
 pub use verdict::{NextExperiment, Verdict, structured};
 
 /// What an explanation may use.
@@ -138,6 +141,7 @@ pub fn explain(
     let weights = &refined.options.loss.scales;
     let setup =
         SearchSetup::new(&prepared, weights, measured, allowed, order_is_given, moving, policy)?;
+    let weighed = vec![OnceCell::new(); setup.policy.noise.rounds];
     let mut state = SearchState::new(&setup, prepared, &refined);
     state.repair()?;
     overall.part(steps.searched, steps.search);
@@ -149,6 +153,9 @@ pub fn explain(
     let mut interrupted = is_interrupted(search::run(&mut state, &mut progress))?;
     if interrupted {
         revision::settle_lags(&mut state)?;
+    } else {
+        interrupted =
+            is_interrupted(coloured::search_weighed(&mut state, &weighed, &mut progress))?;
     }
     for entry in required {
         if !interrupted {
@@ -236,36 +243,4 @@ fn as_measured(prepared: &Record, given: &Record, means: &[f64]) -> Result<Recor
         }
     }
     prepared.with_experiments(experiments)
-}
-
-/// Refines everything once more, grids that were not given included, and estimates the parameters' uncertainty.
-fn finish(
-    state: &mut SearchState,
-    interrupted: bool,
-    progress: Progress,
-) -> Result<Refinement, Error> {
-    let setup = state.setup;
-    let FitPolicy { last_free_steps, last_held_steps, coarser, .. } = setup.policy.fits;
-    let stage = |options: &RefineOptions, steps: usize| {
-        let mut own = fit_options(&state.prepared, options, steps);
-        own.loss.scales.clone_from(&setup.options.loss.scales);
-        own
-    };
-    let mut options = stage(&setup.moving, if interrupted { 1 } else { last_free_steps });
-    options.gain *= coarser;
-    let mut fitted = state.fit(state.point.clone(), &options, "refinement", progress)?;
-    if !interrupted && (setup.moving.thresholds || setup.moving.half_widths) {
-        // with everything free at once, the kinks at which plays turn end the fit before the rest has settled
-        let held = stage(&RefineOptions::default(), last_held_steps);
-        let before = fitted.history;
-        let settled = state.fit(fitted.point, &held, "refinement", progress)?.after(&before);
-        let again = state.fit(settled.point, &options, "refinement", progress)?;
-        fitted = again.after(&settled.history);
-    }
-    state.point = fitted.point.clone();
-    state.repair()?;
-    let refined = Refined { fitted, options, outliers: 0, robust: false };
-    let refinement = refined.finish(&state.prepared, progress)?;
-    state.point = refinement.bands.point.clone();
-    Ok(refinement)
 }

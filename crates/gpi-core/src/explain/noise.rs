@@ -28,7 +28,7 @@ use super::state::SearchState;
 use crate::effects::{ColouredNoise, Effect, Outliers};
 use crate::identify::{NoiseFloor, NoiseMethod};
 use crate::uncertainty::noise_model::NoiseModel;
-use crate::{Error, Matrix, Record};
+use crate::{Matrix, Record};
 
 /// What the noise is besides white, once everything else is explained.
 pub(super) fn effects(
@@ -36,7 +36,7 @@ pub(super) fn effects(
     residuals: &[Matrix],
     tests: &[ResidualTest],
     floor: &NoiseFloor,
-) -> Result<Vec<Effect>, Error> {
+) -> Vec<Effect> {
     let mut found = Vec::new();
     found.extend(outliers(state, residuals));
     for output in 0..state.setup.measured.outputs().len() {
@@ -44,10 +44,12 @@ pub(super) fn effects(
             test.output == output && STRUCTURE.contains(&test.name) && !test.passed()
         };
         if !tests.iter().any(fails) {
-            found.extend(memory(state, residuals, output, floor)?);
+            let noise = memory(state, residuals, output, floor);
+            let noise = noise.filter(|noise| is_alone(state, residuals, noise, floor));
+            found.extend(noise.map(Effect::from));
         }
     }
-    Ok(found)
+    found
 }
 
 /// The samples that were found wrong, and by how much they were changed.
@@ -93,19 +95,19 @@ fn after_jumps(input: &Matrix, policy: &NoisePolicy) -> Vec<bool> {
     after
 }
 
-/// Autocorrelated noise, if the residual's past predicts it on the training data and on what is held out, and if the
-/// noise is also there when nothing moves, as far as the record shows that.
-fn memory(
+/// Autocorrelated noise that most of a residual may be: its past predicts it on the training data and on what is held out, and
+/// the noise is also there when nothing moves, as far as the record shows that.
+pub(super) fn memory(
     state: &SearchState,
     residuals: &[Matrix],
     output: usize,
     floor: &NoiseFloor,
-) -> Result<Option<Effect>, Error> {
+) -> Option<ColouredNoise> {
     let policy = &state.setup.policy.noise;
     let colour = NoiseModel::of(residuals, &state.prepared.record);
     let filter = &colour.coefficients[output];
     if filter.is_empty() {
-        return Ok(None);
+        return None;
     }
     let (own, innovation) = one_step(residuals, &state.prepared.record, output, filter);
     let (held_out, predicted) = one_step(residuals, &state.setup.test, output, filter);
@@ -117,18 +119,26 @@ fn memory(
     };
     // what is predictable from its past alone leaves innovations that are as fast as the noise
     let is_fast = innovation > policy.innovation * floor.rms[output];
-    let is_expanded = state.point.effects.iter().any(|effect| effect.entry().is_expansion);
-    let is_remainder = is_expanded && own > policy.innovation * floor.rms[output];
-    if is_fast
-        || is_remainder
-        || own > loudest
-        || kurtosis(residuals, &state.prepared.record, output) > policy.kurtosis
-    {
-        return Ok(None);
-    }
     let falls = |before: f64, after: f64| after < (1.0 - policy.predicted) * before;
-    let block = ColouredNoise { output, coefficients: filter.clone(), innovation, deviation: own };
-    Ok((falls(own, innovation) && falls(held_out, predicted)).then(|| block.into()))
+    let is_noise = !is_fast && own <= loudest;
+    let is_predicted = falls(own, innovation) && falls(held_out, predicted);
+    let noise = ColouredNoise { output, coefficients: filter.clone(), innovation, deviation: own };
+    (is_noise && is_predicted).then_some(noise)
+}
+
+/// Whether autocorrelated noise is all of a residual that no test of structure finds fault with: it does not come in bursts, and it
+/// is no remainder of an expansion.
+pub(super) fn is_alone(
+    state: &SearchState,
+    residuals: &[Matrix],
+    noise: &ColouredNoise,
+    floor: &NoiseFloor,
+) -> bool {
+    let policy = &state.setup.policy.noise;
+    let is_expanded = state.point.effects.iter().any(|effect| effect.entry().is_expansion);
+    let is_remainder = is_expanded && noise.deviation > policy.innovation * floor.rms[noise.output];
+    let kurtosis = kurtosis(residuals, &state.prepared.record, noise.output);
+    !is_remainder && kurtosis <= policy.kurtosis
 }
 
 /// Standard deviations of a residual and of what its past does not predict.

@@ -13,7 +13,8 @@
 //! The first line follows from `(I - Q)' (I - Q) = I - Q`, because Q is symmetric and `W' J' J W = I`. Where squares
 //! are scaled by a weight (loss and units of the outputs), every product contains it once: `C' C` stands for
 //! `sum_k weight(k) C(k)' C(k)`. With Huber's loss the weights are those at the present residual, and `e' e` is the
-//! loss itself, which exceeds the weighted squares; for plain squares both are the same.
+//! loss itself, which exceeds the weighted squares; for plain squares both are the same. Where the noise has a memory, C, J
+//! and e are what its past does not predict.
 //!
 //! The difference in `left` loses digits where a candidate is nearly what the model does already. Its columns are left
 //! out in [`super::score`] where less than a part of `squares` remains.
@@ -27,7 +28,7 @@ use crate::chain::free_run::Signals;
 use crate::chain::stream::{Rows, Stream};
 use crate::chain::table::Group;
 use crate::effects::{Effect, Proposal, Stage};
-use crate::fit::gather::gather;
+use crate::fit::gather::{gather, whitened};
 use crate::fit::problem::Estimation;
 use crate::optimize::{LeastSquares, Linearization};
 use crate::{Error, Experiment, Matrix};
@@ -60,13 +61,15 @@ impl Base<'_> {
         for (index, experiment) in self.record.experiments().iter().enumerate() {
             let known = &self.signals[index];
             let here = self.point.output_from(Stage::Added, known, experiment, index)?;
-            let columns = columns(known, &here, experiment, index)?;
+            let columns = columns(known, &here, experiment, index)?.into_iter();
+            let columns: Vec<Matrix> =
+                columns.map(|column| whitened(column, experiment, self.loss)).collect();
             let places: Vec<usize> = experiment.scored_runs().flatten().collect();
             let mut first = 0;
             let derivatives = self.freedom.derivatives;
             let table = &self.table;
             let stream = Stream::new(self.point, table, derivatives, experiment, index)?;
-            gather(stream, &mut || Ok(()), |Rows { regressors, residuals }| {
+            gather(stream, self.loss, &mut || Ok(()), |Rows { regressors, residuals, .. }| {
                 let count = residuals.ncols();
                 let places = &places[first..first + count];
                 for (output, regressor) in regressors.iter().enumerate() {
@@ -158,7 +161,7 @@ mod tests {
     use crate::chain::sensitivity::Derivatives;
     use crate::effects::{Drives, InnerLoop, Law, Sees, Stiffness};
     use crate::fit::preparation::Prepared;
-    use crate::optimize::Loss;
+    use crate::optimize::{Autoregression, Loss};
 
     #[test]
     fn columns_of_loops_are_their_derivatives() {
@@ -175,7 +178,8 @@ mod tests {
             identity: true,
             dynamics: DynamicsFreedom::Everything,
         };
-        let loss = Loss { scales: vec![1.0, 0.4], turns: vec![f64::INFINITY; 2] };
+        let noise = [&[][..], &[0.8, -0.2]].map(Autoregression::new).to_vec();
+        let loss = Loss { scales: vec![1.0, 0.4], noise, ..Loss::squares(2) };
         let base = Base::new(&point, &prepared.record, freedom, &loss).unwrap();
         let inner = |law| InnerLoop {
             sees: Sees::Mixture { states: vec![0.3, 0.5, -0.2], inputs: vec![0.1, 0.2] },

@@ -11,7 +11,6 @@ use super::ranking::{ranked, scored_beside};
 use super::revision::{
     drop_superfluous, rearrange, settle_lags, shed_lags, shed_lines, shed_sections, straighten,
 };
-use super::setup::SearchSetup;
 use super::state::{Addition, Rejected, SearchState, Trial};
 use super::steps::finer_steps;
 use super::trial::{join_modes, trial, trials as trials_of};
@@ -65,7 +64,7 @@ fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
             continue;
         };
         let entry = state.point.effects[place].entry();
-        let holdout_rms = state.setup.holdout_rms(&state.held_out(&state.point)?);
+        let [_, holdout_rms] = state.rms(&state.point)?;
         state.remove(place, progress)?;
         let why = why.in_words("the model");
         let (effect, confounded_with) = (entry.name, Vec::new());
@@ -145,7 +144,7 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     };
     let reject = |place: usize| {
         let refusal = refusal(&evidences[place], taken.map(|taken| &evidences[taken]), judgement);
-        rejected(state.setup, &trials[place], refusal, taken.map(|taken| &trials[taken]))
+        rejected(&trials[place], refusal, taken.map(|taken| &trials[taken]))
     };
     let rest = || (0..trials.len()).filter(|&place| Some(place) != taken);
     let mut others: Vec<Rejected> = rest().map(reject).collect();
@@ -158,7 +157,8 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
         accepted.zip(of_others).for_each(|((other, _), of)| other.probability = Some(of));
         Some(own)
     });
-    others.extend(failed.into_iter().map(|one| failure(state.setup, one, &before)));
+    let [_, unchanged] = state.rms(&state.point)?;
+    others.extend(failed.into_iter().map(|one| failure(one, unchanged)));
     let Some(taken) = taken else {
         state.last = others;
         let Some(better) = better else { return Ok(false) };
@@ -215,22 +215,22 @@ fn evidence<'a>(
 }
 
 /// A candidate whose fit failed.
-fn failure(setup: &SearchSetup, (entry, error): (&Entry, Error), before: &[f64]) -> Rejected {
+fn failure((entry, error): (&Entry, Error), holdout_rms: f64) -> Rejected {
     Rejected {
         effect: entry.name,
-        holdout_rms: setup.holdout_rms(before),
+        holdout_rms,
         why: format!("could not be fitted to this record ({error})"),
         confounded_with: Vec::new(),
         probability: None,
     }
 }
 
-fn rejected(setup: &SearchSetup, trial: &Trial, why: Refusal, taken: Option<&Trial>) -> Rejected {
+fn rejected(trial: &Trial, why: Refusal, taken: Option<&Trial>) -> Rejected {
     let taken = taken.map(|taken| taken.entry.name);
     let alike = taken.filter(|_| why == Refusal::Confounded);
     Rejected {
         effect: trial.entry.name,
-        holdout_rms: setup.holdout_rms(&trial.held_out),
+        holdout_rms: trial.rms[1],
         why: why.in_words(taken.unwrap_or("the model")),
         confounded_with: alike.into_iter().collect(),
         probability: None,

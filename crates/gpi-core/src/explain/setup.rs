@@ -9,10 +9,12 @@ use crate::fit::joint::fit_options;
 use crate::fit::minimize::FitOptions;
 use crate::fit::preparation::Prepared;
 use crate::fit::representatives::representatives;
+use crate::optimize::Loss;
 use crate::spectrum::is_one_sine;
 use crate::{Error, Record};
 
 /// What a search is given.
+#[derive(Clone)]
 pub(super) struct SearchSetup {
     /// The prepared record as it was measured, wrong samples included.
     pub measured: Record,
@@ -63,6 +65,14 @@ impl SearchSetup {
         })
     }
 
+    /// The same setup where residuals count by another loss.
+    pub(super) fn with_loss(&self, loss: &Loss) -> Self {
+        let mut other = self.clone();
+        other.options.loss.clone_from(loss);
+        other.moving_grids.loss.clone_from(loss);
+        other
+    }
+
     /// How many unknowns a point has.
     pub(super) fn unknowns(&self, point: &Point) -> usize {
         Table::new(point, self.options.freedom).len
@@ -71,11 +81,6 @@ impl SearchSetup {
     /// Whether derivatives of the whole record would take long.
     pub(super) fn is_long(&self, point: &Point) -> bool {
         representatives(point, &self.measured, self.unknowns(point)).is_some()
-    }
-
-    /// Root mean square of what is held out, from its squares.
-    pub(super) fn holdout_rms(&self, held_out: &[f64]) -> f64 {
-        (held_out.iter().sum::<f64>() / self.held_out_values().max(1.0)).sqrt()
     }
 
     /// Values that are held out.

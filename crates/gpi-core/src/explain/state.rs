@@ -7,6 +7,9 @@
 //! J = sum_o w_o^2 sum_k e_o(k)^2
 //! ```
 //!
+//! Where the noise has a memory that the search knows, e_o(k) is what its past does not predict (see
+//! [`coloured`](super::coloured)).
+//!
 //! The training squares score what is not held out, with the initial states that were fitted there. The held-out
 //! squares come from the same free run over the whole record, block by block, so that no initial state has to be found
 //! for a block. The squares that noise alone would leave are `K sum_o w_o^2 s_o^2`, with K scored samples and the noise
@@ -20,6 +23,7 @@ use crate::effects::{Effect, Entry};
 use crate::fit::joint::Refined;
 use crate::fit::minimize::{FitOptions, Fitted, fit};
 use crate::fit::preparation::Prepared;
+use crate::fit::problem::scored;
 use crate::identify::NoiseFloor;
 use crate::progress::Progress;
 use crate::uncertainty::outliers;
@@ -43,6 +47,8 @@ pub(super) struct Trial {
     pub threshold: f64,
     /// Squares of what is held out, block by block.
     pub held_out: Vec<f64>,
+    /// Root mean square errors on the training data and on what is held out.
+    pub rms: [f64; 2],
     /// The part of the residual's squares that the score test promised.
     pub promised: f64,
     /// Whether the input makes it explain what it does, where it is an effect that the input drives.
@@ -136,6 +142,27 @@ impl<'a> SearchState<'a> {
         }
     }
 
+    /// The same state under another setup of the same record.
+    pub(super) fn under(&self, setup: &'a SearchSetup) -> Result<Self, Error> {
+        let mut same = Self {
+            setup,
+            prepared: self.prepared.clone(),
+            point: self.point.clone(),
+            cost: self.cost,
+            is_rich: false,
+            before_lags: None,
+            additions: self.additions.clone(),
+            left: self.left.clone(),
+            wrong: self.wrong.clone(),
+            last: self.last.clone(),
+            refused: self.refused.clone(),
+            balanced_beside: None,
+            integrates: self.integrates.clone(),
+        };
+        same.cost = same.training_squares(&same.point)?;
+        Ok(same)
+    }
+
     /// Fits a point to the training data.
     pub(super) fn fit(
         &self,
@@ -179,19 +206,24 @@ impl<'a> SearchState<'a> {
         self.squares(point, &self.setup.test)
     }
 
-    /// Squares of every run that `scored` scores.
-    fn squares(&self, point: &Point, scored: &Record) -> Result<Vec<f64>, Error> {
+    /// Squares of every run that `record` scores.
+    fn squares(&self, point: &Point, record: &Record) -> Result<Vec<f64>, Error> {
         // run over the training record, whose initial states were fitted
         let residuals = point.residuals(&self.prepared.record)?;
-        let weights = &self.setup.options.loss.scales;
-        let mut sums = Vec::new();
-        for (residual, experiment) in residuals.iter().zip(scored.experiments()) {
-            for run in experiment.scored_rows(residual) {
-                let columns = run.column_iter().zip(weights);
-                sums.push(columns.map(|(c, w)| w * w * c.norm_squared()).sum());
-            }
-        }
-        Ok(sums)
+        let loss = &self.setup.options.loss;
+        Ok(scored(&residuals, record).map(|run| loss.cost(std::iter::once(run))).collect())
+    }
+
+    /// Root mean square errors of a point on the training data and on what is held out, with the weights of the outputs
+    /// and whatever memory the noise has.
+    pub(super) fn rms(&self, point: &Point) -> Result<[f64; 2], Error> {
+        let residuals = point.residuals(&self.prepared.record)?;
+        let loss = self.setup.options.loss.of_white_noise();
+        let mean = |record: &Record| {
+            let values = record.scored() * record.outputs().len();
+            loss.cost(scored(&residuals, record)) / values.max(1) as f64
+        };
+        Ok([&self.prepared.record, &self.setup.test].map(|record| mean(record).sqrt()))
     }
 
     /// Whether the output integrates the input.
@@ -206,9 +238,12 @@ impl<'a> SearchState<'a> {
     /// The training squares that noise alone would leave.
     pub(super) fn noise_squares(&self) -> Result<f64, Error> {
         let record = &self.prepared.record;
-        let noise = NoiseFloor::estimate(record, &self.point.residuals(record)?);
-        let weights = &self.setup.options.loss.scales;
-        let squares = noise.rms.iter().zip(weights).map(|(rms, weight)| (rms * weight).powi(2));
+        let loss = &self.setup.options.loss;
+        let residuals = self.point.residuals(record)?;
+        let errors: Vec<_> = residuals.iter().map(|residual| loss.all_errors(residual)).collect();
+        let noise = NoiseFloor::estimate(record, &errors);
+        let squares =
+            noise.rms.iter().zip(&loss.scales).map(|(rms, weight)| (rms * weight).powi(2));
         Ok(squares.sum::<f64>() * record.scored() as f64)
     }
 

@@ -200,8 +200,9 @@ pub(super) fn measured(
     };
     let threshold = threshold(state, fitted, options, significance, deviance, progress)?;
     let held_out = state.held_out(&point)?;
+    let rms = state.rms(&point)?;
     let is_driven = is_driven(state, without, &point)?;
-    Ok(Trial { entry, point, cost, deviance, threshold, held_out, promised, is_driven })
+    Ok(Trial { entry, point, cost, deviance, threshold, held_out, rms, promised, is_driven })
 }
 
 /// What a deviance must exceed, with the autocorrelation of the residual of a fit where that matters.

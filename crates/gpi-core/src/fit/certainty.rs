@@ -28,7 +28,8 @@ use crate::uncertainty::settings::UncertaintySettings;
 use crate::{Error, Matrix, Record};
 use nalgebra::DVector;
 
-/// The uncertainty of a fit that left these residuals.
+/// The uncertainty of a fit that left these residuals. Where the fit weighed them by the noise's memory, e and psi are what the
+/// past does not predict.
 ///
 /// Where Huber's loss was used, H is scaled by the loss' mean second derivative over its mean weight.
 pub(crate) fn uncertainty(
@@ -42,8 +43,10 @@ pub(crate) fn uncertainty(
     settings.validate()?;
     let Fitted { point, linearization, .. } = fitted;
     let problem = Estimation::new(point, record, options.freedom, &options.loss);
-    let curvature = options.loss.curvature(scored(&residuals, record));
-    let mut weighted = residuals;
+    let mut weighted: Vec<Matrix> =
+        residuals.iter().map(|residual| options.loss.all_errors(residual)).collect();
+    drop(residuals);
+    let curvature = options.loss.curvature(scored(&weighted, record));
     weighted.iter_mut().for_each(|residual| options.loss.apply(residual));
     let noise = NoiseModel::of(&weighted, record);
     drop(weighted);
@@ -76,7 +79,7 @@ fn score_gram(
         let mut part = NormalEquations::zeros(own.len, 1);
         let mut past: Vec<Matrix> =
             noise.coefficients.iter().map(|a| Matrix::zeros(own.len, a.len())).collect();
-        gather(stream.with_memory(memory), check, |rows| {
+        gather(stream.with_memory(memory), loss, check, |rows| {
             let mut filtered = Vec::new();
             for (output, regressor) in rows.regressors.into_iter().enumerate() {
                 let (filter, past) = (&noise.coefficients[output], &mut past[output]);

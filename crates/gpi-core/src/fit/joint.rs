@@ -160,7 +160,7 @@ fn revived(
 }
 
 /// Factors that bring outputs to one scale, of geometric mean one.
-fn balance(deviations: &[f64]) -> Vec<f64> {
+pub(crate) fn balance(deviations: &[f64]) -> Vec<f64> {
     if deviations.iter().any(|&deviation| deviation <= 0.0) {
         return vec![1.0; deviations.len()];
     }

@@ -21,6 +21,7 @@ use crate::{Error, Experiment, Intersample, Matrix, Model, Record};
 use nalgebra::DVector;
 
 /// A record made ready, and hysteresis parameters to start from.
+#[derive(Clone)]
 pub(crate) struct Prepared<'a> {
     pub given: &'a Record,
     /// The record without the samples that the plays' unknown initial state disturbs, and without the

@@ -15,6 +15,8 @@
 //!
 //! Where the hysteresis has a prior ([`crate::chain::prior`]), its terms are added to all three.
 //!
+//! Where the noise has a memory ([`Loss`]), e and psi are those that its past does not predict.
+//!
 //! psi is never stored: its rows are streamed through the chain in blocks, each block is added to `gram` and
 //! `descent`, and the memory needed does not grow with N times unknowns. Where the Gram matrix of a whole record would
 //! take long, it comes from a part of it (see [`representatives`]) and the gradient from an adjoint pass, which costs a
@@ -75,7 +77,7 @@ impl LeastSquares for Estimation<'_> {
             let wanted = self.freedom.derivatives;
             let stream = Stream::new(point, &own, wanted, experiment, index)?;
             let mut part = NormalEquations::zeros(own.len, 1);
-            gather(stream.with_memory(memory), check, |rows| {
+            gather(stream.with_memory(memory), self.loss, check, |rows| {
                 cost += add(&mut part, rows, self.loss);
             })?;
             gram.add_part(&part.gram, &places);
@@ -172,6 +174,7 @@ mod tests {
     use crate::chain::point::DynamicsFreedom;
     use crate::chain::sensitivity::Derivatives;
     use crate::fit::preparation::Prepared;
+    use crate::optimize::Autoregression;
 
     #[test]
     fn gradient_is_the_one_that_all_derivatives_give() {
@@ -197,13 +200,20 @@ mod tests {
             identity: true,
             dynamics: DynamicsFreedom::Everything,
         };
-        let loss = Loss { scales: vec![1.0, 0.4], turns: vec![0.8, f64::INFINITY] };
-        let record = &prepared.record;
+        for coefficients in [&[][..], &[0.9, -0.3, 0.1]] {
+            let noise = [coefficients, &[]].map(Autoregression::new).to_vec();
+            let loss = Loss { scales: vec![1.0, 0.4], turns: vec![0.8, f64::INFINITY], noise };
+            compare_with(&point, &prepared.record, freedom, &loss);
+        }
+    }
+
+    fn compare_with(point: &Point, record: &Record, freedom: Freedom, loss: &Loss) {
         let mut check = || Ok(());
-        let problem = Estimation::new(&point, record, freedom, &loss);
-        let all = problem.linearize(&point, &mut check).unwrap();
-        let (found, cost) = problem.gradient(&point, &mut check).unwrap();
+        let problem = Estimation::new(point, record, freedom, loss);
+        let all = problem.linearize(point, &mut check).unwrap();
+        let (found, cost) = problem.gradient(point, &mut check).unwrap();
         let expected = &all.descent;
+        assert!((problem.evaluate(point).unwrap() / all.cost - 1.0).abs() < 1e-12);
         assert!((cost / all.cost - 1.0).abs() < 1e-12);
         assert!(
             expected.iter().filter(|value| value.abs() > 1e-6).count() > expected.len() * 9 / 10

@@ -160,7 +160,7 @@ fn hubers_loss_resists_outliers() {
         (residuals, Matrix::from_fn(20, 2, |k, j| if j == 0 { 1.0 } else { k as f64 }))
     };
     let squares = Problem::new(line).minimum(&[0.0, 0.0]);
-    let loss = Loss { scales: vec![1.0], turns: vec![0.02] };
+    let loss = Loss { turns: vec![0.02], ..Loss::squares(1) };
     let robust = Problem { loss, ..Problem::new(line) }.minimum(&[0.0, 0.0]);
     let error = |found: &DVector<f64>| (found[0] - 1.0).abs() + 20.0 * (found[1] - 0.5).abs();
     assert!(error(&squares.point) > 1.0, "{}", squares.point);

@@ -1,7 +1,9 @@
 //! How residuals count.
 
+use super::whitening::Autoregression;
 use crate::Matrix;
 use nalgebra::DMatrixView;
+use std::borrow::Cow;
 
 /// Squares or Huber's loss of scaled residuals. For an output of scale s and turn t, a residual e costs
 ///
@@ -11,18 +13,67 @@ use nalgebra::DMatrixView;
 /// ```
 ///
 /// In normal equations the loss is that of weighted squares, with weight `s^2 min(1, t / |e|)`.
+///
+/// Where the noise of an output has a memory, e is what the residual's past does not predict (see
+/// [`whitening`](super::whitening)).
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Loss {
     /// A factor for each output, which brings outputs of different units to one scale.
     pub scales: Vec<f64>,
     /// Where the loss turns from square to linear, in each output's unit; infinite for least squares.
     pub turns: Vec<f64>,
+    /// The memory of each output's noise.
+    pub noise: Vec<Autoregression>,
 }
 
 impl Loss {
     /// Plain least squares.
     pub(crate) fn squares(outputs: usize) -> Self {
-        Self { scales: vec![1.0; outputs], turns: vec![f64::INFINITY; outputs] }
+        let (scales, turns) = (vec![1.0; outputs], vec![f64::INFINITY; outputs]);
+        Self { scales, turns, noise: vec![Autoregression::new(&[]); outputs] }
+    }
+
+    /// The same loss for noise without a memory.
+    pub(crate) fn of_white_noise(&self) -> Self {
+        Self { noise: vec![Autoregression::new(&[]); self.noise.len()], ..self.clone() }
+    }
+
+    /// Whether no output's noise has a memory.
+    pub(crate) fn is_white(&self) -> bool {
+        self.noise.iter().all(Autoregression::is_white)
+    }
+
+    /// What counts of a run of residuals of an output: themselves, or what their past does not predict.
+    pub(crate) fn errors<'a>(&self, output: usize, run: &'a [f64]) -> Cow<'a, [f64]> {
+        let noise = &self.noise[output];
+        let mut run = Cow::Borrowed(run);
+        if !noise.is_white() {
+            noise.whiten(run.to_mut());
+        }
+        run
+    }
+
+    /// The same of all residuals (samples, outputs) of an experiment, as if it were one run.
+    pub(crate) fn all_errors(&self, residuals: &Matrix) -> Matrix {
+        let mut errors = residuals.clone();
+        for (mut column, noise) in errors.column_iter_mut().zip(&self.noise) {
+            noise.whiten(column.as_mut_slice());
+        }
+        errors
+    }
+
+    /// Turns a run of residuals of an output into what enters the gradient by them, and returns the loss.
+    pub(crate) fn weigh(&self, output: usize, run: &mut [f64]) -> f64 {
+        let noise = &self.noise[output];
+        noise.whiten(run);
+        let mut cost = 0.0;
+        for value in run.iter_mut() {
+            let (weight, own) = self.of(output, *value);
+            cost += own;
+            *value *= weight;
+        }
+        noise.whiten_adjoint(run);
+        cost
     }
 
     /// The weight of a residual's square in normal equations, and the loss that it adds to the cost.
@@ -36,11 +87,14 @@ impl Loss {
         }
     }
 
-    /// The sum of the losses of residuals, each a block (samples, outputs).
+    /// The sum of the losses of residuals, each a run (samples, outputs).
     pub(crate) fn cost<'a>(&self, residuals: impl Iterator<Item = DMatrixView<'a, f64>>) -> f64 {
         let of = |rows: DMatrixView<f64>| -> f64 {
             let outputs = rows.column_iter().enumerate();
-            outputs.map(|(o, column)| column.iter().map(|&e| self.of(o, e).1).sum::<f64>()).sum()
+            let loss = |o: usize, run: &[f64]| -> f64 {
+                self.errors(o, run).iter().map(|&e| self.of(o, e).1).sum()
+            };
+            outputs.map(|(o, column)| loss(o, column.as_slice())).sum()
         };
         residuals.map(of).sum()
     }

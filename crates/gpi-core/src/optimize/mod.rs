@@ -10,6 +10,7 @@ mod literature;
 mod loss;
 mod problem;
 mod settings;
+mod whitening;
 
 pub use levenberg_marquardt::Status;
 pub(crate) use levenberg_marquardt::{Minimum, levenberg_marquardt};
@@ -17,3 +18,4 @@ pub(crate) use linearization::Linearization;
 pub(crate) use loss::Loss;
 pub(crate) use problem::{Bounds, LeastSquares};
 pub(crate) use settings::SolverSettings;
+pub(crate) use whitening::{Autoregression, Whitening};

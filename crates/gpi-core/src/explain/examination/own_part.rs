@@ -40,7 +40,10 @@ pub(super) fn is_beyond_chance(
     let own: usize =
         table.rows().filter(|(group, _)| is_of(*group, place)).map(|(_, row)| row.len()).sum();
     let variance = cost / state.prepared.values();
-    let kappa = autocorrelation(&point.residuals(record)?, record, &options.loss.scales, policy);
+    let residuals = point.residuals(record)?;
+    let errors: Vec<Matrix> =
+        residuals.iter().map(|residual| options.loss.all_errors(residual)).collect();
+    let kappa = autocorrelation(&errors, record, &options.loss.scales, policy);
     let few = representatives(point, record, table.len);
     let alone = few.map(|few| few.alone(point, record)).transpose()?;
     let (point, record) = alone.as_ref().map_or((point, record), |(p, r)| (p, r));

@@ -40,8 +40,8 @@ use crate::{Error, Matrix, Model, Record};
 use compared::Compared;
 use families::{Family, ScaledSignals};
 use outcome::{NAMES, points_to};
+pub(super) use outcome::{PREDICTION, STRUCTURE, WHITENESS};
 pub use outcome::{ResidualTest, Significance};
-pub(super) use outcome::{STRUCTURE, WHITENESS};
 use policy::ResidualPolicy;
 
 /// How the residual of a model is taken.
