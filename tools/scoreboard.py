@@ -156,13 +156,13 @@ def reproduced(result: Result) -> str:
     )
 
 
-def as_markdown(tables: Iterable[score_tables.Table]) -> str:
-    """Return the tables, below the command that made them."""
+def as_markdown(tables: Iterable[score_tables.Table], title: str) -> str:
+    """Return the tables, below a title and the command that made them."""
     words = iter(sys.argv[1:])
     # the file of earlier results and the number of processes do not change the tables
     told = [word for word in words if word not in ("--keep", "--processes") or next(words) is None]
     command = shlex.join(["python", "tools/scoreboard.py", *told])
-    return "\n".join([f"# Scoreboard\n\nMade by `{command}`.\n", *(table.markdown() for table in tables)])
+    return "\n".join([f"# {title}\n\nMade by `{command}`.\n", *(table.markdown() for table in tables)])
 
 
 def main() -> None:
@@ -249,7 +249,9 @@ def main() -> None:
         print(f"\ntime: median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s")
     if arguments.markdown is not None:
         arguments.markdown.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(arguments.markdown, as_markdown(tables))
+        only_textbook = arguments.textbook and not (arguments.plants or arguments.records or arguments.clean)
+        title = "Scoreboard: stages of other textbooks" if only_textbook else "Scoreboard"
+        write_atomically(arguments.markdown, as_markdown(tables, title))
 
 
 if __name__ == "__main__":
