@@ -14,9 +14,13 @@
 //! 1999, sections 3.2 and 7.4.
 //!
 //! Any smooth error is predicted by its past, the error of a wrong model too, which would pass for noise here. What the rounds
-//! find is therefore kept only if they leave autocorrelated noise and nothing else, by all tests of structure, and if e is
-//! hardly larger than before: noise moves the estimates of both fits by little, but where e is an error of the model, the
-//! fit makes it larger for a smaller w. Otherwise the model before the rounds stands.
+//! find is therefore kept only if the following holds; otherwise the model before the rounds stands.
+//!
+//! - They leave autocorrelated noise and nothing else, by all tests of structure.
+//! - e is hardly larger than before. Noise moves the estimates of both fits by little, but where e is an error of the model,
+//!   the fit makes it larger for a smaller w.
+//! - The a_i also predict the noise at rest or between repeated periods, where the record has them: the error of a model is
+//!   not there when nothing moves.
 
 use super::finish::refined;
 use super::noise::{is_alone, memory};
@@ -24,13 +28,13 @@ use super::residual::{PREDICTION, STRUCTURE, WHITENESS, tests_of};
 use super::search::run;
 use super::setup::SearchSetup;
 use super::state::SearchState;
-use crate::Error;
 use crate::effects::ColouredNoise;
 use crate::fit::joint::balance;
 use crate::fit::problem::residual_rms;
-use crate::identify::NoiseFloor;
+use crate::identify::{NoiseFloor, NoiseMethod};
 use crate::optimize::{Autoregression, Loss};
 use crate::progress::Progress;
+use crate::{Error, Matrix};
 use std::cell::OnceCell;
 
 /// Goes on with the search where the noise has a memory, for as many rounds as there are places for their setups.
@@ -57,11 +61,29 @@ pub(super) fn search_weighed<'a>(
     Ok(())
 }
 
-/// Whether autocorrelated noise is all that the latest state leaves, and its residual is not much larger than before.
+/// Whether autocorrelated noise is all that the latest state leaves, its residual is not much larger than before, and the noise is also
+/// there at rest.
 fn is_better(latest: &SearchState, before: &SearchState) -> Result<bool, Error> {
     let most = 1.0 + before.setup.policy.noise.grown;
-    let has_grown = latest.rms(&latest.point)?[0] > most * before.rms(&before.point)?[0];
-    Ok(!has_grown && matches!(residual(latest)?, Some((Residual::Noise, _))))
+    if latest.rms(&latest.point)?[0] > most * before.rms(&before.point)?[0] {
+        return Ok(false);
+    }
+    match residual(latest)? {
+        Some((Residual::Noise, loss)) => is_there_at_rest(latest, &loss),
+        _ => Ok(false),
+    }
+}
+
+/// Whether the past of the noise also predicts what was found of it without the model, where the record shows that.
+fn is_there_at_rest(state: &SearchState, loss: &Loss) -> Result<bool, Error> {
+    let record = &state.prepared.record;
+    let residuals = state.point.residuals(record)?;
+    let floor = NoiseFloor::estimate(record, &residuals);
+    let errors: Vec<Matrix> = residuals.iter().map(|residual| loss.all_errors(residual)).collect();
+    let predicted = NoiseFloor::estimate(record, &errors);
+    let mut outputs = loss.noise.iter().zip(predicted.rms.iter().zip(&floor.rms));
+    Ok(floor.method == NoiseMethod::HighFrequencyResidual
+        || outputs.all(|(noise, (predicted, all))| noise.is_white() || predicted < all))
 }
 
 /// What the search finds from a state on under another setup, and a last fit of it, by which it is judged.

@@ -9,7 +9,7 @@
 //! J_input <= (1 + p) J,      T_input <= (1 + p) T,
 //! ```
 //!
-//! for the part p that a section of G beside such a force must explain ([`super::policy`]). Near the noise, the training squares may grow
+//! for the part p below which parts of the model are negligible ([`super::policy`]). Near the noise, the training squares may grow
 //! by `N ln(J_input / J) <= q ln N` only for the q numbers that it saves. It begins at the same force in steady state,
 //! and with either hold of v between samples where loops take several steps.
 
@@ -25,24 +25,19 @@ pub(super) fn enter_with_input(state: &mut SearchState, progress: Progress) -> R
     let Some(point) = with_input(&state.point) else { return Ok(()) };
     let present = point.intersample;
     let holds = if present.is_plain() { vec![present.hold] } else { vec![Hold::First, Hold::Zero] };
-    let squares = |point: &Point| Ok::<f64, Error>(state.held_out(point)?.iter().sum());
-    let policy = &state.setup.policy;
-    let most = 1.0 + policy.revision.section;
-    let is_far = state.cost > policy.judgement.near_noise * state.noise_squares()?;
+    let is_far = state.cost > state.setup.policy.judgement.near_noise * state.noise_squares()?;
     let (values, unknowns) = (state.prepared.values(), |point| state.setup.unknowns(point) as f64);
     let saved = unknowns(&state.point) - unknowns(&point);
-    let most_of_training =
-        if is_far { most } else { most.min((saved * values.ln() / values).exp()) };
-    let [train, held_out] = [most_of_training * state.cost, most * squares(&state.point)?];
+    let most =
+        if is_far { f64::INFINITY } else { (saved * values.ln() / values).exp() * state.cost };
     let mut best: Option<(Point, f64)> = None;
     for hold in holds {
         let mut point = point.clone();
         point.intersample = Intersample { hold, ..present };
         let fitted = state.fit(point, &state.setup.options, "rearrangement", progress)?;
-        let (point, cost) = (fitted.point, fitted.linearization.cost);
-        let least = best.as_ref().map_or(train, |&(_, cost)| cost);
-        if cost <= least && squares(&point)? <= held_out {
-            best = Some((point, cost));
+        let least = best.as_ref().map_or(most, |&(_, cost)| cost);
+        if fitted.linearization.cost <= least && state.explains_nearly_as_much(&fitted)? {
+            best = Some((fitted.point, fitted.linearization.cost));
         }
     }
     if let Some(best) = best {

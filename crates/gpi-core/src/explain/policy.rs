@@ -275,7 +275,7 @@ settings! {
         /// Part by which all squares may grow without a section of G that stands beside a mode with a loop, without a hysteresis before
         /// such a loop, or where forces enter with the input: 2.5 % of the error. Far from the noise, what explains so little may
         /// stand for anything, and it takes a share of the force. By hand.
-        section: f64 = 0.05, PART;
+        negligible: f64 = 0.05, PART;
         /// Factor by which the held-out squares may grow when a driven effect replaces a slow function of time. By hand.
         driven_instead: f64 = 1.05, FROM_ONE;
         /// Fits that are compared after an exchange take so many times the steps of a trial: they start farther from
@@ -293,9 +293,9 @@ settings! {
         /// Part of a whitened residual's variance that the input may predict for the search to go on in this way. By hand: more is
         /// the error of a model beside a little noise.
         predictable: f64 = 0.1, PART;
-        /// Part by which the rms residual may grow there. By hand: 1 % on a stage with 1/f noise and a drifting gain, 12 % where a
-        /// smooth error of the model passed for noise.
-        grown: f64 = 0.05, PART;
+        /// Part by which the rms residual may grow there. By hand: 1 % on a stage with 1/f noise and a drifting gain, 4 % and 12 %
+        /// where a smooth error of the model passed for noise.
+        grown: f64 = 0.02, PART;
         /// Fewer wrong samples may be noise, or come from the way in which a record was cut. By hand.
         fewest: usize = 3, FROM_ONE;
         /// Part of them that may follow a jump of the input: where most do, the model errs at jumps. By hand.

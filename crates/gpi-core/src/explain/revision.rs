@@ -98,11 +98,8 @@ pub(super) fn straighten(state: &mut SearchState, progress: Progress) -> Result<
     let then = state.held_out(&fitted.point)?;
     let policy = &state.setup.policy;
     let is_far = state.cost > policy.judgement.near_noise * state.noise_squares()?;
-    let most = 1.0 + policy.revision.section;
-    let explains_little = is_far
-        && fitted.linearization.cost <= most * state.cost
-        && then.iter().sum::<f64>() <= most * now.iter().sum::<f64>();
-    if explains_little || is_superfluous(lost, price, [&now, &then], policy.revision.superfluous) {
+    let is_negligible = is_far && state.explains_nearly_as_much(&fitted)?;
+    if is_negligible || is_superfluous(lost, price, [&now, &then], policy.revision.superfluous) {
         (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
     }
     Ok(())
@@ -125,14 +122,10 @@ pub(super) fn shed_sections(state: &mut SearchState, progress: Progress) -> Resu
         }
         let without = state.point.without_section(section);
         let fitted = state.fit(without, &state.setup.options, "rearrangement", progress)?;
-        let squares = |point| Ok::<f64, Error>(state.held_out(point)?.iter().sum());
-        let most = 1.0 + state.setup.policy.revision.section;
-        let is_needed = fitted.linearization.cost > most * state.cost
-            || squares(&fitted.point)? > most * squares(&state.point)?;
-        if is_needed {
-            section += 1;
-        } else {
+        if state.explains_nearly_as_much(&fitted)? {
             (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
+        } else {
+            section += 1;
         }
     }
     Ok(())

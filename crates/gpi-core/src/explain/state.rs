@@ -247,6 +247,14 @@ impl<'a> SearchState<'a> {
         Ok(squares.sum::<f64>() * record.scored() as f64)
     }
 
+    /// Whether a fit without a part of the model leaves hardly more of the training and of the held-out squares.
+    pub(super) fn explains_nearly_as_much(&self, fitted: &Fitted) -> Result<bool, Error> {
+        let most = 1.0 + self.setup.policy.revision.negligible;
+        let held_out = |point| Ok::<f64, Error>(self.held_out(point)?.iter().sum());
+        Ok(fitted.linearization.cost <= most * self.cost
+            && held_out(&fitted.point)? <= most * held_out(&self.point)?)
+    }
+
     /// Takes the model of a trial, and remembers what led to it.
     pub(super) fn add(&mut self, addition: Addition) -> Result<(), Error> {
         self.left.push(std::mem::replace(&mut self.point, addition.trial.point.clone()));

@@ -59,6 +59,8 @@ pub(super) fn doubt(
     let trained = state.prepared.record.scored().max(1) as f64;
     let noise = state.noise_squares()? / trained;
     let is_near = state.held_out(point)?.iter().sum::<f64>() / test <= policy.near.powi(2) * noise;
+    let mut leaves =
+        |part: f64| Ok::<bool, Error>(state.cost > part * state.best_without(place, progress)?.1);
     if is_near {
         Ok(None)
     } else if exceedances(&of, &state.prepared.record).is_some_and(|n| n < policy.exceedances) {
@@ -66,8 +68,7 @@ pub(super) fn doubt(
     } else if let Place::Output(own) = of
         && own.is_pinched()
     {
-        let is_weak = state.cost > policy.left_at_most * state.best_without(place, progress)?.1;
-        Ok(is_weak.then_some(Refusal::ResemblesMisfit))
+        Ok(leaves(policy.left_at_most)?.then_some(Refusal::ResemblesMisfit))
     } else if matches!(of, Place::Widths(_) | Place::Output(_)) {
         Ok(Some(Refusal::ResemblesMisfit))
     } else if let Place::Loops(own) = of {
@@ -77,19 +78,17 @@ pub(super) fn doubt(
             let is_explained = found.is_some_and(|own| 1.0 - own.explained <= policy.left);
             Ok((!is_explained).then_some(Refusal::Integrates))
         } else {
-            let is_weak = own.loops().iter().any(|inner| inner.law.is_dissipative())
-                && state.cost > policy.left * state.best_without(place, progress)?.1;
+            let is_weak =
+                own.loops().iter().any(|inner| inner.law.is_dissipative()) && leaves(policy.left)?;
             Ok(is_weak.then_some(Refusal::ResemblesMisfit))
         }
     } else if size(state, point, place)? > policy.large {
         Ok(Some(Refusal::TooLarge))
     } else if entry.signature == Signature::SlowInTime {
-        let follows = state.integrates()?
-            || state.cost > policy.left_by_slow * state.best_without(place, progress)?.1;
+        let follows = state.integrates()? || leaves(policy.left_by_slow)?;
         Ok(follows.then_some(Refusal::FollowsTheRest))
     } else if let Place::Parallel(_) = of {
-        let is_weak = state.cost > policy.left_at_most * state.best_without(place, progress)?.1;
-        Ok(is_weak.then_some(Refusal::Insubstantial))
+        Ok(leaves(policy.left_at_most)?.then_some(Refusal::Insubstantial))
     } else {
         Ok(None)
     }
