@@ -12,7 +12,8 @@ pytestmark = pytest.mark.slow
 SEEDS = (1000, 1001)
 # A slew limit explains the responses to four jumps; a sensor's curve a part of what a motor integrates.
 # A column leaks through a lag that has not settled when the record begins.
-MORE = [("maxwell-slip", 1009), ("motor", 3002), ("lagged-leak", 1005)]
+# A slow error of the model is no coloured noise where the noise at rest is white.
+MORE = [("maxwell-slip", 1009), ("motor", 3002), ("lagged-leak", 1005), ("heater", 1003)]
 INTEGRATING = ("motor", "hydraulic")
 # Their lags outlast the impulse response that the record affords.
 SLOW = [("tanks", 1003), ("tanks", 1004), ("tanks", 1005), ("heater", 1001)]

@@ -45,7 +45,7 @@ use super::between::{Between, Row};
 use super::injections::{Injection, Places, injections};
 use super::motion::{advance_adjoint, columns, rows};
 use super::point::{Freedom, Point};
-use super::stream::{Stream, begins};
+use super::stream::Stream;
 use super::table::{Group, Table};
 use super::tangents::{Trace, memories, sensed};
 use crate::effects::{InnerLoop, Sees, Slope};
@@ -98,7 +98,7 @@ fn descent_of(
     let mut stream = Stream::new(point, table, freedom.derivatives, experiment, index)?;
     let mut descent = DVector::zeros(table.len);
     let mut blocks = stream.traces();
-    let cost = weigh(&mut blocks, loss);
+    let cost = weigh(&mut blocks, experiment, loss);
     for (trace, residuals) in &blocks {
         for (column, k) in residuals.column_iter().zip(&trace.scored) {
             for (output, &sensitivity) in column.iter().enumerate() {
@@ -124,28 +124,26 @@ fn descent_of(
     Ok((descent, cost))
 }
 
-/// Turns residuals (outputs, scored samples), block by block, into what enters the gradient by them, and returns the cost.
-fn weigh(blocks: &mut [(Trace, Matrix)], loss: &Loss) -> f64 {
-    let mut next = None;
-    let mut runs: Vec<Vec<(usize, usize)>> = Vec::new();
-    for (block, (trace, _)) in blocks.iter().enumerate() {
-        let begins = begins(trace, &mut next);
-        for column in 0..trace.scored.len() {
-            if begins.contains(&column) {
-                runs.push(Vec::new());
-            }
-            runs.last_mut().into_iter().for_each(|run| run.push((block, column)));
-        }
-    }
+/// Turns the residuals (outputs, scored samples) of all blocks into what enters the gradient by them, and returns the cost.
+fn weigh(blocks: &mut [(Trace, Matrix)], experiment: &Experiment, loss: &Loss) -> f64 {
     let mut cost = 0.0;
     for output in 0..loss.scales.len() {
-        for run in &runs {
-            let value = |&(block, column): &(usize, usize)| blocks[block].1[(output, column)];
-            let mut values: Vec<f64> = run.iter().map(value).collect();
-            cost += loss.weigh(output, &mut values);
-            for (&(block, column), value) in run.iter().zip(values) {
-                blocks[block].1[(output, column)] = value;
-            }
+        let rows = blocks.iter().map(|(_, residuals)| residuals.row(output));
+        let mut values: Vec<f64> =
+            rows.flat_map(|row| row.iter().copied().collect::<Vec<_>>()).collect();
+        let mut rest = &mut values[..];
+        for run in experiment.scored_runs() {
+            let (own, behind) = rest.split_at_mut(run.len());
+            cost += loss.weigh(output, own);
+            rest = behind;
+        }
+        let mut weighed = values.into_iter();
+        for (_, residuals) in blocks.iter_mut() {
+            residuals
+                .row_mut(output)
+                .iter_mut()
+                .zip(&mut weighed)
+                .for_each(|(own, value)| *own = value);
         }
     }
     cost

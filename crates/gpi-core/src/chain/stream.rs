@@ -179,7 +179,7 @@ impl Behind<'_> {
 
 /// The scored samples of a block that do not follow on the scored sample before them; `next` is the sample behind the
 /// latest scored one.
-pub(super) fn begins(trace: &Trace, next: &mut Option<usize>) -> Vec<usize> {
+fn begins(trace: &Trace, next: &mut Option<usize>) -> Vec<usize> {
     let is_new = |(_, k): &(usize, &usize)| {
         let sample = trace.samples.start + **k;
         next.replace(sample + 1) != Some(sample)

@@ -28,13 +28,13 @@ use super::residual::{PREDICTION, STRUCTURE, WHITENESS, tests_of};
 use super::search::run;
 use super::setup::SearchSetup;
 use super::state::SearchState;
+use crate::Error;
 use crate::effects::ColouredNoise;
 use crate::fit::joint::balance;
 use crate::fit::problem::residual_rms;
 use crate::identify::{NoiseFloor, NoiseMethod};
 use crate::optimize::{Autoregression, Loss};
 use crate::progress::Progress;
-use crate::{Error, Matrix};
 use std::cell::OnceCell;
 
 /// Goes on with the search where the noise has a memory, for as many rounds as there are places for their setups.
@@ -79,8 +79,7 @@ fn is_there_at_rest(state: &SearchState, loss: &Loss) -> Result<bool, Error> {
     let record = &state.prepared.record;
     let residuals = state.point.residuals(record)?;
     let floor = NoiseFloor::estimate(record, &residuals);
-    let errors: Vec<Matrix> = residuals.iter().map(|residual| loss.all_errors(residual)).collect();
-    let predicted = NoiseFloor::estimate(record, &errors);
+    let predicted = NoiseFloor::estimate(record, &loss.all_errors(&residuals));
     let mut outputs = loss.noise.iter().zip(predicted.rms.iter().zip(&floor.rms));
     Ok(floor.method == NoiseMethod::HighFrequencyResidual
         || outputs.all(|(noise, (predicted, all))| noise.is_white() || predicted < all))

@@ -239,8 +239,7 @@ impl<'a> SearchState<'a> {
     pub(super) fn noise_squares(&self) -> Result<f64, Error> {
         let record = &self.prepared.record;
         let loss = &self.setup.options.loss;
-        let residuals = self.point.residuals(record)?;
-        let errors: Vec<_> = residuals.iter().map(|residual| loss.all_errors(residual)).collect();
+        let errors = loss.all_errors(&self.point.residuals(record)?);
         let noise = NoiseFloor::estimate(record, &errors);
         let squares =
             noise.rms.iter().zip(&loss.scales).map(|(rms, weight)| (rms * weight).powi(2));

@@ -43,8 +43,7 @@ pub(crate) fn uncertainty(
     settings.validate()?;
     let Fitted { point, linearization, .. } = fitted;
     let problem = Estimation::new(point, record, options.freedom, &options.loss);
-    let mut weighted: Vec<Matrix> =
-        residuals.iter().map(|residual| options.loss.all_errors(residual)).collect();
+    let mut weighted = options.loss.all_errors(&residuals);
     drop(residuals);
     let curvature = options.loss.curvature(scored(&weighted, record));
     weighted.iter_mut().for_each(|residual| options.loss.apply(residual));

@@ -53,11 +53,13 @@ impl Loss {
         run
     }
 
-    /// The same of all residuals (samples, outputs) of an experiment, as if it were one run.
-    pub(crate) fn all_errors(&self, residuals: &Matrix) -> Matrix {
-        let mut errors = residuals.clone();
-        for (mut column, noise) in errors.column_iter_mut().zip(&self.noise) {
-            noise.whiten(column.as_mut_slice());
+    /// The same of all residuals (samples, outputs) of each experiment, as if it were one run.
+    pub(crate) fn all_errors(&self, residuals: &[Matrix]) -> Vec<Matrix> {
+        let mut errors = residuals.to_vec();
+        for experiment in &mut errors {
+            for (mut column, noise) in experiment.column_iter_mut().zip(&self.noise) {
+                noise.whiten(column.as_mut_slice());
+            }
         }
         errors
     }

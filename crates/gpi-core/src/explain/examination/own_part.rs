@@ -40,9 +40,7 @@ pub(super) fn is_beyond_chance(
     let own: usize =
         table.rows().filter(|(group, _)| is_of(*group, place)).map(|(_, row)| row.len()).sum();
     let variance = cost / state.prepared.values();
-    let residuals = point.residuals(record)?;
-    let errors: Vec<Matrix> =
-        residuals.iter().map(|residual| options.loss.all_errors(residual)).collect();
+    let errors = options.loss.all_errors(&point.residuals(record)?);
     let kappa = autocorrelation(&errors, record, &options.loss.scales, policy);
     let few = representatives(point, record, table.len);
     let alone = few.map(|few| few.alone(point, record)).transpose()?;
