@@ -39,21 +39,21 @@ demo: $(NATIVE) ## Run `gpi demo` and write its pictures to out/demo
 # Two at a time where one does not fill both cores. The tests of Python run alone, because some measure waiting times.
 together = +@$(MAKE) --no-print-directory -j2
 
-test: programs ## Run all checks and tests
-	$(together) $(TOOLS) lint-rust
-	$(together) compile-rust
+test: programs ## Run all tests, and the lint and type checks of Python
+	$(together) $(TOOLS) compile-rust
 	$(together) test-rust lint-python
 	$(together) test-python
 
 lint: lint-rust lint-python ## Run the format, lint and type checks of both languages
 
+# Not a part of `test`: clippy reads all dependencies once more, and a minimal installation of Rust lacks both programs.
 lint-rust: ## Run rustfmt and clippy
 	$(call heading,Rust: format)
 	cargo fmt --all --check -- $(EFFECTS)
 	$(call heading,Rust: lint)
 	PYO3_PYTHON=$(PYTHON) cargo clippy --release --workspace --all-targets -- -D warnings
 
-# First of all, because cargo makes the build of the wheel wait for that of the tests, or the other way round.
+# Before the wheel, because cargo makes the build of the wheel wait for that of the tests, or the other way round.
 compile-rust:
 	$(call heading,Rust: compile)
 	PYO3_PYTHON=$(PYTHON) cargo test --release --workspace --exclude benches --no-run
