@@ -18,18 +18,6 @@ use crate::progress::{Overall, Progress, Report};
 use crate::{Channel, Error, Experiment, Hysteresis, Intersample, Matrix, Record};
 use nalgebra::DVector;
 
-/// The first sample from which no play remembers its start: z has spanned twice the widest half-width.
-pub(crate) fn forgets_at(input: impl Iterator<Item = f64>, widest: f64) -> Option<usize> {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for (k, value) in input.enumerate() {
-        (low, high) = (low.min(value), high.max(value));
-        if high - low >= 2.0 * widest {
-            return Some(k);
-        }
-    }
-    None
-}
-
 /// A hysteresis fitted to an input and an intermediate signal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HysteresisFit {

@@ -4,7 +4,8 @@
 //! `max z - min z >= 2 r`, its output no longer depends on F(-1), because it has touched both bounds. Where the
 //! inputs are zero at first, the actuator starts at rest and the initial state is known. Elsewhere it is unknown:
 //!
-//! - If all plays lose it early (k* is at most a tenth of the experiment), the samples before k* are not scored.
+//! - If all plays lose it early (k* is at most a tenth of the experiment), and z reaches as far behind k* as in the whole
+//!   experiment, the samples before k* are not scored. Where the amplitude decays, these samples alone show the widest plays.
 //! - Otherwise `F(-1) = z(0) + s r` with `-1 <= s <= 1` is fitted, one s for each play.
 //!
 //! In both cases the state of G (one vector for each experiment, as long as the order) is fitted as well.
@@ -13,7 +14,6 @@ use crate::chain::hysteresis::Parameters;
 use crate::chain::point::{Past, Point};
 use crate::effects::{Drives, PlaceMut, Sees};
 use crate::fit::Grid;
-use crate::fit::hysteresis::forgets_at;
 use crate::fit::model_sections::sections_of;
 use crate::fit::settings::{FitSettings, PreparationSettings};
 use crate::linear::Sections;
@@ -51,6 +51,15 @@ impl<'a> Prepared<'a> {
         Self::with_settings(given, channels, settings)
     }
 
+    /// The same, and no experiment begins at rest.
+    pub(crate) fn in_motion(given: &'a Record, channels: Vec<Parameters>) -> Result<Self, Error> {
+        let mut settings = FitSettings::default();
+        settings.preparation.forgetting = 0.0;
+        // no input is zero for longer
+        settings.preparation.quiet = given.longest();
+        Self::with_settings(given, channels, settings)
+    }
+
     fn with_settings(
         given: &'a Record,
         channels: Vec<Parameters>,
@@ -65,7 +74,7 @@ impl<'a> Prepared<'a> {
         for (index, experiment) in experiments.iter_mut().enumerate() {
             // A warm-up ends the effect of the initial state, but not where plays are wider than the input's range.
             let is_hidden = experiment.warmup > 0 && fraction > 0.0;
-            if starts_at_rest(experiment) || is_hidden {
+            if begins_at_rest(experiment, &settings.preparation) || is_hidden {
                 continue;
             }
             has_unknown_state[index] = true;
@@ -74,7 +83,9 @@ impl<'a> Prepared<'a> {
                 let mut previous = 0.0;
                 let u = experiment.input.column(input).into_owned();
                 let z = u.iter().map(|&u| channel.envelope(std::mem::replace(&mut previous, u), u));
-                forgets_at(z, widest)
+                let z: Vec<f64> = z.collect();
+                let at = forgets_at(&z, widest)?;
+                (span(&z[at..]) >= settings.preparation.reach * span(&z)).then_some(at)
             });
             let forgets = forgets.try_fold(0, |latest, at| Some(latest.max(at?)));
             match forgets {
@@ -92,8 +103,8 @@ impl<'a> Prepared<'a> {
                 _ => {
                     has_unknown_plays[index] = true;
                     notes.push(format!(
-                        "experiment {index} has an unknown initial state, on which the plays depend for a long time: \
-                         the initial state of the plays is fitted"
+                        "experiment {index} has an unknown initial state, and the samples that depend on it are many or \
+                         the only ones of their amplitude: the initial state of the plays is fitted"
                     ));
                 }
             }
@@ -217,6 +228,22 @@ impl<'a> Prepared<'a> {
     }
 }
 
+/// The first sample from which no play remembers its start: z has spanned twice the widest half-width.
+fn forgets_at(z: &[f64], widest: f64) -> Option<usize> {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    z.iter().position(|&value| {
+        (low, high) = (low.min(value), high.max(value));
+        high - low >= 2.0 * widest
+    })
+}
+
+fn span(z: &[f64]) -> f64 {
+    let (low, high) = z.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
+        (low.min(value), high.max(value))
+    });
+    high - low
+}
+
 /// Refuses a model whose channels or rate are not those of a record.
 pub(crate) fn require_match(model: &Model, record: &Record) -> Result<(), Error> {
     let inputs = (("model", model.inputs().len()), ("record", record.inputs().len()));
@@ -232,7 +259,11 @@ pub(crate) fn require_match(model: &Model, record: &Record) -> Result<(), Error>
 
 /// Whether all inputs are zero for a while before anything moves.
 pub(crate) fn starts_at_rest(experiment: &Experiment) -> bool {
-    let PreparationSettings { quiet, zero, .. } = PreparationSettings::default();
+    begins_at_rest(experiment, &PreparationSettings::default())
+}
+
+fn begins_at_rest(experiment: &Experiment, settings: &PreparationSettings) -> bool {
+    let &PreparationSettings { quiet, zero, .. } = settings;
     let input = &experiment.input;
     let largest = input.amax();
     input.nrows() > quiet && input.rows(0, quiet).amax() <= zero * largest
@@ -264,16 +295,18 @@ mod tests {
     use crate::chain::hysteresis::{Elements, Prior};
     use crate::operators::Reading;
 
-    #[test]
-    fn held_out_ranges_end_where_they_did_and_begin_after_the_warm_up() {
-        // plays of half-width 1 have touched both bounds after half a period of this sine, in motion from the start
-        let u: Vec<f64> = (0..400).map(|k| 2.0 * (0.1 * f64::from(k + 5)).sin()).collect();
-        let mut run =
-            Experiment::new(Matrix::from_vec(400, 1, u.clone()), Matrix::from_vec(400, 1, u));
-        run.held_out = vec![0..4, 6..60, 200..250];
+    /// A record that begins in motion, of an input u.
+    fn moving(u: Vec<f64>, held_out: Vec<std::ops::Range<usize>>) -> Record {
+        let samples = u.len();
+        let input = Matrix::from_vec(samples, 1, u);
+        let run = Experiment { held_out, ..Experiment::new(input.clone(), input) };
         let (inputs, outputs) = (vec![Channel::new("u", "V")], vec![Channel::new("y", "um")]);
-        let record = Record::new(vec![run], 100.0, inputs, outputs, vec![]).unwrap();
-        let channel = Parameters {
+        Record::new(vec![run], 100.0, inputs, outputs, vec![]).unwrap()
+    }
+
+    /// Two plays, the wider one of half-width 1.
+    fn plays() -> Vec<Parameters> {
+        vec![Parameters {
             elements: Elements::Plays,
             reading: Reading::OneSided,
             thresholds: vec![0.0],
@@ -281,8 +314,30 @@ mod tests {
             half_widths: vec![0.0, 1.0],
             weights: vec![1.0, 0.5],
             prior: Prior::default(),
+        }]
+    }
+
+    #[test]
+    fn the_only_samples_of_the_largest_amplitude_are_scored() {
+        let sine = |decay: f64| {
+            let at =
+                move |k: i32| 2.0 * (-decay * f64::from(k)).exp() * (0.1 * f64::from(k + 5)).sin();
+            moving((0..2000).map(at).collect(), vec![])
         };
-        let prepared = Prepared::new(&record, vec![channel]).unwrap();
+        for (decay, is_fitted) in [(0.0, false), (1e-3, true)] {
+            let record = sine(decay);
+            let prepared = Prepared::new(&record, plays()).unwrap();
+            assert_eq!(prepared.has_unknown_plays, [is_fitted]);
+            assert_eq!(prepared.record.experiments()[0].warmup == 0, is_fitted);
+        }
+    }
+
+    #[test]
+    fn held_out_ranges_end_where_they_did_and_begin_after_the_warm_up() {
+        // plays of half-width 1 have touched both bounds after half a period of this sine, in motion from the start
+        let u: Vec<f64> = (0..400).map(|k| 2.0 * (0.1 * f64::from(k + 5)).sin()).collect();
+        let record = moving(u, vec![0..4, 6..60, 200..250]);
+        let prepared = Prepared::new(&record, plays()).unwrap();
         let own = &prepared.record.experiments()[0];
         assert!((7..40).contains(&own.warmup), "{}", own.warmup);
         assert_eq!(own.held_out, [own.warmup..60, 200..250]);

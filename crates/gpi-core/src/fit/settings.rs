@@ -67,6 +67,9 @@ settings! {
         /// Part of an experiment that may be left out of the score while the plays lose their unknown initial
         /// state. Where they need longer, their initial state is fitted. By hand.
         forgetting: f64 = 0.1, PART;
+        /// Part of the range of the plays' input that the rest of the experiment must reach for that. Plays that only the samples
+        /// before have moved are wider than this part of half the range: 1 % is no more than a step of the densest grid of plays.
+        reach: f64 = 0.99, PART;
         /// An experiment starts at rest if its first samples, so many, are zero. By hand.
         quiet: usize = 10, FROM_ONE;
         /// Part of the largest input below which an input is zero: far below any resolution, above rounding.
