@@ -24,6 +24,8 @@ errors.
 
 All errors are rms errors of simulation: the model sees the input alone, and the initial state is fitted to
 the first samples. The error of the training part is that of blocks of time that were not used for the fit.
+The error over horizons is that of predictions over this time, each from an initial state that is fitted to
+the samples before it (`Model.over_horizons`), on all of the training part.
 The multisine and the sweep of `bouc-wen` have no noise: they are integrated from the published equations,
 and the official test files are other realisations. Published errors are those of the official tests.
 """

@@ -153,6 +153,7 @@ VALIDATION = closed(
         **COUNTED,
         "left_out": listed(text(), "effects that were left out"),
         "error": part("figures"),
+        "horizons": maybe(closed({"seconds": size("s"), "error": part("figures")})),
         "residual": closed({"structured": flag(), "tests": listed(part("test"))}),
         "figures": listed(part("left")),
     }

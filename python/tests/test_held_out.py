@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
+from numpy.typing import NDArray
 
 import gpi_hammerstein as gpi
 from gpi_hammerstein.cli import run
@@ -112,3 +113,61 @@ def test_functions_of_time_are_left_out_on_another_record(
     np.testing.assert_allclose(
         own["error"]["rms"], model.error(gpi.read_record(path), fit_start=True)["rms"], rtol=1e-9
     )
+
+
+def slide() -> gpi.Model:
+    """x' = v, v' = u - 5 v, held between samples: a slide with viscous friction that integrates its input."""
+    pole = np.exp(-5 / RATE)
+    reach = (1 - pole) / 5
+    layout = json.loads(model_of(plant()).to_json())
+    layout["hysteresis"][0]["envelope"].update(thresholds=[0.0], weights=[1.0])
+    layout["hysteresis"][0]["plays"].update(half_widths=[0.0], weights=[1.0])
+    layout["linear"] = {
+        "a": [[1.0, 0.0, reach, pole], 2, 2],
+        "b": [[(1 / RATE - reach) / 5, reach], 2, 1],
+        "c": [[1.0, 0.0], 1, 2],
+        "d": [[0.0], 1, 1],
+    }
+    return gpi.Model.from_json(json.dumps(layout))
+
+
+def slid(u: NDArray[np.float64]) -> gpi.Record:
+    """A record of the slide."""
+    return gpi.Record(u, slide().simulate(u), rate=RATE)
+
+
+def test_predictions_over_a_limited_time_begin_at_the_measured_state() -> None:
+    model = slide()
+    assert model.over_horizons(slid(drive(4000)), 0.5)["fit_percent"] > 99.9
+    # a force that the model does not know moves the slide by about force t^2 / 2
+    pushed = gpi.Record(drive(4000), model.simulate(drive(4000) + 0.02), rate=RATE)
+    whole = model.on_another_record(pushed)["error"]["rms"]
+    half, quarter = (model.over_horizons(pushed, seconds)["rms"] for seconds in (0.5, 0.25))
+    assert quarter < 0.4 * half < 0.1 * whole
+
+
+def test_parts_of_a_record_do_not_begin_at_rest() -> None:
+    """The slide coasts while its input is zero."""
+    model, u = slide(), drive(3000)
+    u[1000:1400] = 0.0
+    moved = model.simulate(u)
+    assert np.ptp(moved[1000:1400]) > 0.1 * np.ptp(moved)
+    coasting = gpi.Record(u[1000:], moved[1000:], rate=RATE)
+    assert model.over_horizons(coasting, 0.3)["fit_percent"] > 99.9
+
+
+@pytest.mark.parametrize("seconds", [0.0, 1e-4, 1e6, float("nan")])
+def test_a_horizon_that_is_no_part_of_the_record_is_refused(seconds: float) -> None:
+    with pytest.raises(gpi.ParameterError, match="horizon"):
+        slide().over_horizons(slid(drive(2000)), seconds)
+
+
+def test_the_command_prints_the_error_over_a_horizon(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, model = write_csv(tmp_path / "record.csv", in_motion()), tmp_path / "model.json"
+    model_of(plant()).save(model)
+    found = call(capsys, "validate", model, path, "--horizon", "0.2")["horizons"]
+    assert found["seconds"] == 0.2
+    assert found["error"] == gpi.load(model).over_horizons(gpi.read_record(path), 0.2)
+    assert call(capsys, "validate", model, path)["horizons"] is None

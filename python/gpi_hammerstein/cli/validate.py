@@ -34,6 +34,16 @@ OwnRecord = Annotated[
     ),
 ]
 
+Horizon = Annotated[
+    float | None,
+    typer.Option(
+        "--horizon",
+        help="Also compute the error of predictions over this time, each from an initial state that is "
+        "fitted to the samples before. Use it for a plant whose output integrates the input.",
+        metavar="SECONDS",
+    ),
+]
+
 # Above this share of half the sampling rate, sensor noise dominates the residual.
 HIGH_BAND = 0.75
 
@@ -53,6 +63,7 @@ def validate(
     fit_start: options.FitStart = True,
     remove_mean: options.RemoveMean = False,
     own_record: OwnRecord = False,
+    horizon: Horizon = None,
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
@@ -85,6 +96,7 @@ def validate(
         else:
             found = model.on_another_record(record, remove_mean=remove_mean, fit_start=fit_start)
             error, model = found["error"], found["model"]
+        over = None if horizon is None else model.over_horizons(record, horizon)
         residual = residual_tests(model, record, remove_mean=remove_mean, fit_start=fit_start)
         figures = residual_figures(model, record, fit_start=fit_start)
     # tests name the channels of the model, which the record may call otherwise
@@ -100,6 +112,7 @@ def validate(
         "rule": rule,
         "skipped_s": skip,
         "error": error,
+        "horizons": None if over is None else {"seconds": horizon, "error": over},
         "residual": residual,
         "figures": figures,
         "files": [],
@@ -120,6 +133,9 @@ def validate(
         screen.print(f"[yellow]note[/] {escape(note)}")
     title = f"Simulation error ({rule})"
     screen.print(error_table({"record": error}, common_unit(record), title))
+    if over is not None:
+        title = f"Error of predictions over {horizon:g} s (initial state fitted to the samples before)"
+        screen.print(error_table({"record": over}, common_unit(record), title))
     screen.print(tests_table(residual["tests"]))
     for sentence in failed_in_words(residual["tests"]):
         screen.print(escape(sentence))

@@ -171,6 +171,7 @@ BENCHMARKS: dict[str, Benchmark] = {
             factor=1e3,
             read=emps,
             published={},
+            horizon=1.0,
         ),
         Benchmark(
             name="cascaded-tanks",

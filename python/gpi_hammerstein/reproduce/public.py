@@ -32,6 +32,8 @@ class Benchmark:
     read: Callable[[Path], dict[str, Record]]
     #: Published rms errors by the part of the benchmark, with their sources.
     published: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    #: Seconds over which predictions are scored too, for a plant that integrates its input.
+    horizon: float | None = None
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,8 @@ def reproduce(
     -------
     Reproduction
         The explanation, and the rms errors of simulation on each part. The error of the training part is that
-        of the blocks of time that were held out.
+        of the blocks of time that were held out; that of its horizons is over all of its samples
+        (`Model.over_horizons`).
 
     Raises
     ------
@@ -93,6 +96,10 @@ def reproduce(
     models = found.models[0], found.model
     held_out = found.before["holdout"]["rms"], found.after["holdout"]["rms"]
     errors = {TRAINING: (held_out[0] * benchmark.factor, held_out[1] * benchmark.factor)}
+    if (horizon := benchmark.horizon) is not None:
+        part = f"{TRAINING}, horizons of {horizon:g} s"
+        before, after = (model.over_horizons(parts[TRAINING], horizon)["rms"] for model in models)
+        errors[part] = (before * benchmark.factor, after * benchmark.factor)
     for name, record in parts.items():
         if name != TRAINING:
             before, after = (rms(model, record) * benchmark.factor for model in models)

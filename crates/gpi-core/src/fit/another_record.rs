@@ -62,15 +62,22 @@ pub fn on_another_record(
     fit_start: bool,
     progress: Progress,
 ) -> Result<OnAnotherRecord, Error> {
-    let left_out = functions_of_time(model);
-    let kept = model.effects().iter().filter(|effect| effect.entry().driven);
-    let model = model.clone().with_effects(kept.map(Effect::without_start).collect())?;
+    let (model, left_out) = without_functions_of_time(model)?;
     let residuals = if fit_start {
         residuals_from_fitted_start(&model, record, progress)?
     } else {
         model.residuals(record)?
     };
     Ok(OnAnotherRecord { model, left_out, residuals })
+}
+
+/// The model without the effects that are functions of the time of their own record, and the names of these.
+pub(super) fn without_functions_of_time(
+    model: &Model,
+) -> Result<(Model, Vec<&'static str>), Error> {
+    let kept = model.effects().iter().filter(|effect| effect.entry().driven);
+    let kept = kept.map(Effect::without_start).collect();
+    Ok((model.clone().with_effects(kept)?, functions_of_time(model)))
 }
 
 /// Names of the effects of a model that are functions of the time of the record that it was fitted to, each once.

@@ -23,10 +23,20 @@ pub fn residuals_from_fitted_start(
     record: &Record,
     progress: Progress,
 ) -> Result<Vec<Matrix>, Error> {
-    require_match(model, record)?;
-    model.require_covariates_of(record)?;
     let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
     let prepared = Prepared::scoring_all(record, channels)?;
+    fitted_start(model, record, &prepared, progress)
+}
+
+/// The same for a record that is prepared.
+pub(super) fn fitted_start(
+    model: &Model,
+    record: &Record,
+    prepared: &Prepared,
+    progress: Progress,
+) -> Result<Vec<Matrix>, Error> {
+    require_match(model, record)?;
+    model.require_covariates_of(record)?;
     let mut point = prepared.point_of(model)?;
     for offsets in &mut point.offsets {
         for (output, mut column) in offsets.column_iter_mut().enumerate() {
@@ -34,7 +44,7 @@ pub fn residuals_from_fitted_start(
         }
     }
     let own = &prepared.settings.initial_state;
-    let mut options = fit_options(&prepared, &RefineOptions::default(), own.steps);
+    let mut options = fit_options(prepared, &RefineOptions::default(), own.steps);
     options.freedom.weights = false;
     options.freedom.offsets = false;
     options.freedom.identity = false;

@@ -24,7 +24,7 @@ mod structure;
 pub use crate::chain::hysteresis::Elements;
 pub use crate::fit::{
     Grid, HysteresisFit, OnAnotherRecord, Parameter, RefineOptions, Refinement, Sensitivities,
-    Status, fit_hysteresis, functions_of_time, on_another_record, refine,
+    Status, fit_hysteresis, functions_of_time, on_another_record, over_horizons, refine,
     residuals_from_fitted_start, sensitivities,
 };
 pub use crate::progress::{Progress, Report};

@@ -59,7 +59,7 @@ impl Experiment {
     }
 
     /// The rows of a range as an experiment of their own, with `warmup` and nothing held out.
-    pub(super) fn rows(&self, range: Range<usize>, warmup: usize) -> Self {
+    pub(crate) fn rows(&self, range: Range<usize>, warmup: usize) -> Self {
         let rows = |matrix: &Matrix| matrix.rows(range.start, range.len()).into_owned();
         let covariates = rows(&self.covariates);
         Self { covariates, warmup, ..Self::new(rows(&self.input), rows(&self.output)) }

@@ -21,7 +21,9 @@ use crate::plotting::in_notebook;
 use crate::progress::interruptible;
 use crate::record::Record;
 use gpi_core::compensate::CompensateOptions;
-use gpi_core::identify::{functions_of_time, on_another_record, residuals_from_fitted_start};
+use gpi_core::identify::{
+    functions_of_time, on_another_record, over_horizons, residuals_from_fitted_start,
+};
 use gpi_core::{LoopStep, Matrix, SimulationError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -172,6 +174,20 @@ impl Model {
         let model = Self { model: found.model, identification: None, refinement: None };
         result.set_item("model", Py::new(py, model)?)?;
         Ok(result)
+    }
+
+    #[doc = include_str!("../docs/model/over_horizons.txt")]
+    fn over_horizons<'py>(
+        &self,
+        py: Python<'py>,
+        record: &Bound<'py, PyAny>,
+        seconds: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let record = calls::record("record", record, "model.over_horizons(")?;
+        let (model, record) = (&self.model, &record.get().record);
+        let found =
+            interruptible(py, None, |report| over_horizons(model, record, seconds, report))?;
+        figures(py, &found)
     }
 
     #[doc = include_str!("../docs/model/simulate.txt")]
