@@ -21,7 +21,7 @@ use crate::effects::{
 };
 use crate::linear::{Section, Sections};
 use crate::{Intersample, Matrix};
-use nalgebra::DVector;
+use nalgebra::{Complex, DVector};
 use std::ops::Range;
 
 /// The initial state of an experiment.
@@ -174,6 +174,22 @@ impl Point {
         point
     }
 
+    /// The point without the sections of G all of whose poles are unwanted; `None` where there are none, or none else. What loops drive and
+    /// see of the other sections stays.
+    pub(crate) fn without_sections(
+        &self,
+        unwanted: impl Fn(&Complex<f64>) -> bool,
+    ) -> Option<Self> {
+        let is_unwanted = |section: &Section| section.poles().iter().all(&unwanted);
+        let sections = &self.dynamics.sections;
+        let dropped: Vec<usize> =
+            (0..sections.len()).rev().filter(|&own| is_unwanted(&sections[own])).collect();
+        let is_part = !dropped.is_empty() && dropped.len() < sections.len();
+        is_part.then(|| {
+            dropped.into_iter().fold(self.clone(), |point, section| point.without_section(section))
+        })
+    }
+
     /// The loops that effects close around G, to be changed.
     pub(crate) fn loops_mut(&mut self) -> impl Iterator<Item = &mut InnerLoop> {
         let loops = self.effects.iter_mut().filter_map(|effect| match effect.place_mut() {
@@ -259,6 +275,12 @@ mod tests {
         // a pair and a single pole; they are left out in turn
         let orders: Vec<usize> = point.dynamics.sections.iter().map(Section::order).collect();
         assert_eq!(orders, [2, 1]);
+        let is_real = |pole: &Complex<f64>| pole.im == 0.0;
+        let pair = point.without_sections(is_real).unwrap();
+        assert_eq!(pair.dynamics.sections, point.dynamics.sections[..1]);
+        assert!(
+            point.without_sections(|_| true).is_none() && pair.without_sections(is_real).is_none()
+        );
         for (section, left) in [(0, 2..3), (1, 0..2)] {
             let without = point.without_section(section);
             let states = &point.pasts[0].state.as_slice()[left.clone()];

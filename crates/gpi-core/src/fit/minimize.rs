@@ -71,7 +71,11 @@ pub(crate) fn fit(
     let (steps, gain) = (options.steps, options.gain);
     let settings = SolverSettings { steps, gain, ..SolverSettings::default() };
     let mut check = |done: f64| report(progress, phase, done);
-    let Minimum { point, linearization, history, status } =
+    let Minimum { point, mut linearization, history, status } =
         levenberg_marquardt(&problem, point, &settings, &mut check)?;
+    if linearization.cost.is_nan() {
+        // see `Loss::cost`
+        linearization.cost = f64::INFINITY;
+    }
     Ok(Fitted { point, linearization, table: problem.table, history, status })
 }

@@ -89,7 +89,8 @@ impl Loss {
         }
     }
 
-    /// The sum of the losses of residuals, each a run (samples, outputs).
+    /// The sum of the losses of residuals, each a run (samples, outputs). It is infinite where they are no numbers, so that a model that
+    /// diverges is worse than any other one.
     pub(crate) fn cost<'a>(&self, residuals: impl Iterator<Item = DMatrixView<'a, f64>>) -> f64 {
         let of = |rows: DMatrixView<f64>| -> f64 {
             let outputs = rows.column_iter().enumerate();
@@ -98,7 +99,8 @@ impl Loss {
             };
             outputs.map(|(o, column)| loss(o, column.as_slice())).sum()
         };
-        residuals.map(of).sum()
+        let sum: f64 = residuals.map(of).sum();
+        if sum.is_nan() { f64::INFINITY } else { sum }
     }
 
     /// The mean second derivative of the loss over the mean weight that stands in for it in the normal equations:
@@ -124,5 +126,21 @@ impl Loss {
             let (scale, turn) = (self.scales[output], self.turns[output]);
             column.apply(|value| *value = scale * value.clamp(-turn, turn));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Matrix;
+
+    #[test]
+    fn what_diverges_is_worse_than_all_else() {
+        let of = |last: f64| {
+            let residual = Matrix::from_column_slice(3, 1, &[1.0, 2.0, last]);
+            Loss::squares(1).cost(std::iter::once(residual.rows(0, 3)))
+        };
+        assert_eq!(of(2.0), 9.0);
+        assert_eq!([of(f64::NAN), of(f64::INFINITY)], [f64::INFINITY; 2]);
     }
 }
