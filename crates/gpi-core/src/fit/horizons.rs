@@ -21,7 +21,7 @@ use crate::{Error, Experiment, Model, Record, SimulationError};
 /// short enough that the model has not drifted away within them.
 const LEAD: f64 = 0.25;
 
-/// The error of predictions over so many seconds, from the rule of this module's documentation: an initial state that is fitted
+/// The error of predictions over a horizon in seconds, from the rule of this module's documentation: an initial state that is fitted
 /// to the samples before each horizon.
 ///
 /// ```
@@ -51,18 +51,18 @@ const LEAD: f64 = 0.25;
 pub fn over_horizons(
     model: &Model,
     record: &Record,
-    seconds: f64,
+    horizon: f64,
     progress: Progress,
 ) -> Result<SimulationError, Error> {
-    let samples = (seconds * record.rate()).round();
+    let samples = (horizon * record.rate()).round();
     let requirement = "must be at least two samples";
-    Error::require(samples >= 2.0 && samples.is_finite(), "horizon", seconds, requirement)?;
-    let (horizon, lead) = (samples as usize, (LEAD * samples).ceil() as usize);
+    Error::require(samples >= 2.0 && samples.is_finite(), "horizon", horizon, requirement)?;
+    let (length, lead) = (samples as usize, (LEAD * samples).ceil() as usize);
     let pieces: Vec<Experiment> =
-        record.experiments().iter().flat_map(|own| pieces(own, horizon, lead)).collect();
+        record.experiments().iter().flat_map(|own| pieces(own, length, lead)).collect();
     let requirement =
         "must be so short that an experiment has a whole horizon and a quarter of it before";
-    Error::require(!pieces.is_empty(), "horizon", seconds, requirement)?;
+    Error::require(!pieces.is_empty(), "horizon", horizon, requirement)?;
     let pieces = record.with_experiments(pieces)?;
     let (model, left_out) = without_functions_of_time(model)?;
     let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
@@ -73,13 +73,13 @@ pub fn over_horizons(
 }
 
 /// The horizons of an experiment, each behind its lead and held out.
-fn pieces(experiment: &Experiment, horizon: usize, lead: usize) -> Vec<Experiment> {
+fn pieces(experiment: &Experiment, length: usize, lead: usize) -> Vec<Experiment> {
     let rows = experiment.input.nrows();
-    let starts = (experiment.warmup..).step_by(horizon);
-    let starts = starts.take_while(|start| start + lead + horizon <= rows);
+    let starts = (experiment.warmup..).step_by(length);
+    let starts = starts.take_while(|start| start + lead + length <= rows);
     let piece = |start: usize| {
-        let mut piece = experiment.rows(start..start + lead + horizon, 0);
-        piece.held_out.push(lead..lead + horizon);
+        let mut piece = experiment.rows(start..start + lead + length, 0);
+        piece.held_out.push(lead..lead + length);
         piece
     };
     starts.map(piece).collect()

@@ -181,12 +181,12 @@ impl Model {
         &self,
         py: Python<'py>,
         record: &Bound<'py, PyAny>,
-        seconds: f64,
+        horizon: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
         let record = calls::record("record", record, "model.over_horizons(")?;
         let (model, record) = (&self.model, &record.get().record);
         let found =
-            interruptible(py, None, |report| over_horizons(model, record, seconds, report))?;
+            interruptible(py, None, |report| over_horizons(model, record, horizon, report))?;
         figures(py, &found)
     }
 
