@@ -43,7 +43,7 @@ class Kept:
         self.results: dict[str, Result] = {}
         if path is not None and path.exists():
             for name, values in json.loads(path.read_text()).items():
-                lists = ("wanted", "found", "may")
+                lists = ("wanted", "found", "may", "one_of")
                 names = {key: tuple(values[key]) for key in lists if values.get(key) is not None}
                 self.results[name] = Result(**{**values, **names})
 
@@ -112,13 +112,12 @@ def power_work(arguments: argparse.Namespace) -> Iterator[Job]:
 
 def textbook_work(arguments: argparse.Namespace) -> Iterator[Job]:
     """Yield some seeds of every stage of another textbook; every second one starts in motion."""
-    for name in textbook.STAGES:
-        # a whole name means this stage alone
-        if arguments.only == name or (
-            arguments.only not in textbook.STAGES and (arguments.only or "") in name
-        ):
-            seeds = range(arguments.seed, arguments.seed + arguments.textbook)
-            yield from ((of_textbook, (name, seed)) for seed in seeds)
+    for stages, number in ((textbook.STAGES, arguments.textbook), (textbook.MECHANICS, arguments.mechanics)):
+        for name in stages:
+            # a whole name means this stage alone
+            if arguments.only == name or (arguments.only not in stages and (arguments.only or "") in name):
+                seeds = range(arguments.seed, arguments.seed + number)
+                yield from ((of_textbook, (name, seed)) for seed in seeds)
 
 
 def clean_work(arguments: argparse.Namespace) -> Iterator[Job]:
@@ -151,8 +150,9 @@ def run(pool: Executor, work: Iterable[Job], kept: Kept) -> list[Result]:
 def reproduced(result: Result) -> str:
     """Return the command that explains the record of one textbook stage again."""
     seed = result.name.split(",")[0].split()[-1]
+    option = "textbook" if result.stage in textbook.STAGES else "mechanics"
     return (
-        f"python tools/scoreboard.py --no-records --plants 0 --textbook 1 --seed {seed} --only {result.stage}"
+        f"python tools/scoreboard.py --no-records --plants 0 --{option} 1 --seed {seed} --only {result.stage}"
     )
 
 
@@ -188,6 +188,13 @@ def main() -> None:
         default=0,
         metavar="N",
         help="N seeds of every stage of other textbooks; odd seeds start in motion",
+    )
+    parser.add_argument(
+        "--mechanics",
+        type=int,
+        default=0,
+        metavar="N",
+        help="N seeds of every stage with a force inside the mechanics, alone and beside another effect",
     )
     parser.add_argument(
         "--clean",
@@ -249,8 +256,10 @@ def main() -> None:
         print(f"\ntime: median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s")
     if arguments.markdown is not None:
         arguments.markdown.parent.mkdir(parents=True, exist_ok=True)
-        only_textbook = arguments.textbook and not (arguments.plants or arguments.records or arguments.clean)
-        title = "Scoreboard: stages of other textbooks" if only_textbook else "Scoreboard"
+        is_alone = not (arguments.plants or arguments.records or arguments.clean)
+        parts = [arguments.textbook and "stages of other textbooks"]
+        parts.append(arguments.mechanics and "forces inside the mechanics")
+        title = ": ".join(["Scoreboard", *([" and ".join(filter(None, parts))] if is_alone else [])])
         write_atomically(arguments.markdown, as_markdown(tables, title))
 
 

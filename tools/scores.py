@@ -27,7 +27,7 @@ class Result:
     """The result of one record: errors over the noise, and the strength of a single effect, if given.
 
     ``again`` is the error on another experiment, NaN where there is none; ``stage`` is the name of a stage of
-    another textbook.
+    another textbook; ``one_of`` are names of which one must be found.
     """
 
     name: str
@@ -42,6 +42,7 @@ class Result:
     strength: float | None = None
     may: tuple[str, ...] | None = None
     stage: str | None = None
+    one_of: tuple[str, ...] = ()
 
     def is_right(self) -> bool:
         """Return whether the effects are those of the label.
@@ -53,7 +54,14 @@ class Result:
             return False
         if self.may is None:
             return sorted(self.wanted) == sorted(self.found)
-        return not self.has_false() and (set(self.wanted) <= set(self.found) or self.is_absorbed())
+        return not self.has_false() and not self.is_missed()
+
+    def is_missed(self) -> bool:
+        """Return whether an effect that must be named is missing."""
+        is_named = set(self.wanted) <= set(self.found)
+        if self.one_of:
+            is_named = is_named and not set(self.one_of).isdisjoint(self.found)
+        return not is_named and not self.is_absorbed()
 
     def is_absorbed(self) -> bool:
         """Return whether the error is down to the noise, so that nothing is left to be named."""
@@ -61,7 +69,11 @@ class Result:
 
     def has_false(self) -> bool:
         """Return whether an effect was named that is not present."""
-        return not set(self.found) <= {*self.wanted, *(self.may or ())}
+        return bool(self.false_names())
+
+    def false_names(self) -> list[str]:
+        """Return what was named and is not present."""
+        return [name for name in self.found if name not in {*self.wanted, *(self.may or ()), *self.one_of}]
 
     def kind(self) -> str:
         """Return the kind of answer: right, partly right, nothing found, or wrong."""
@@ -167,7 +179,7 @@ def within(drive: Callable[[int], NDArray[np.float64]], most: int = 30) -> int:
 
 def of_textbook(stage: str, seed: int) -> Result:
     """Explain one record of a stage of another textbook; the label says what must and what may be named."""
-    label = textbook.STAGES[stage]
+    label = (textbook.STAGES | textbook.MECHANICS)[stage]
     number = within(lambda number: textbook.draw(stage, seed, number).u)
     one, two = (textbook.draw(stage, seed, number) for number in (0, number))
     record, again = (
@@ -185,7 +197,7 @@ def of_textbook(stage: str, seed: int) -> Result:
         print(f"{name}: {refusal}", file=sys.stderr, flush=True)
         nothing = (np.nan, np.nan, np.nan, np.nan)
         result = Result(name, must, (), REFUSED, *nothing, is_outside=is_outside, may=may)
-    return replace(result, stage=stage)
+    return replace(result, stage=stage, one_of=tuple(sorted(label.one_of)))
 
 
 def as_record(run: plants.Recording) -> gpi.Record:

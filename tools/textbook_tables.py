@@ -20,14 +20,14 @@ def by_stage(results: Iterable[Result]) -> Table:
         groups.setdefault(result.stage or "", []).append(result)
     rows = []
     for stage, found in groups.items():
-        false = Counter(name for result in found for name in false_names(result))
+        false = Counter(name for result in found for name in result.false_names())
         rows.append(
             (
                 stage,
-                ", ".join(found[0].wanted) or "none",
+                wanted(found[0]),
                 f"{sum(result.is_right() for result in found)} of {len(found)}",
                 str(sum(result.has_false() for result in found)),
-                str(sum(is_missed(result) for result in found)),
+                str(sum(result.is_missed() for result in found)),
                 "; ".join(f"{count} x {name}" for name, count in false.most_common()),
                 f"{np.median([result.after for result in found]):.2f}",
             )
@@ -62,9 +62,9 @@ def mistakes(results: Iterable[Result], command: Callable[[Result], str]) -> Tab
     rows = [
         (
             result.name,
-            ", ".join(result.wanted) or "none",
+            wanted(result),
             ", ".join(result.found) or "none",
-            ", ".join(false_names(result)) or "none",
+            ", ".join(result.false_names()) or "none",
             result.verdict,
             f"{result.before:.2f}",
             f"{result.after:.2f}",
@@ -77,14 +77,9 @@ def mistakes(results: Iterable[Result], command: Callable[[Result], str]) -> Tab
     return Table("Stages of other textbooks: answers that are not right", heads, rows)
 
 
-def false_names(result: Result) -> list[str]:
-    """Return what was named and is not present."""
-    return [name for name in result.found if name not in {*result.wanted, *(result.may or ())}]
-
-
-def is_missed(result: Result) -> bool:
-    """Return whether an effect that must be named is missing."""
-    return not result.is_absorbed() and not set(result.wanted) <= set(result.found)
+def wanted(result: Result) -> str:
+    """Return the names that the label asks for."""
+    return ", ".join([*result.wanted, *([" or ".join(result.one_of)] if result.one_of else [])]) or "none"
 
 
 def share(count: int, total: int) -> str:

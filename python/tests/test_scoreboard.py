@@ -2,6 +2,7 @@
 
 import argparse
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -158,12 +159,26 @@ def test_what_is_not_right_is_listed_with_the_command_that_repeats_it() -> None:
 
 
 def test_the_work_on_textbook_stages() -> None:
-    asked = argparse.Namespace(only=None, textbook=2, seed=10)
-    names = [values for _, values in scoreboard.textbook_work(asked)]
-    assert len(names) == 2 * len(textbook.STAGES)
-    assert names[:2] == [("clean", 10), ("clean", 11)]
+    def names(only: str | None, stages: int, mechanics: int) -> list[tuple[object, ...]]:
+        asked = argparse.Namespace(only=only, textbook=stages, mechanics=mechanics, seed=10)
+        return [values for _, values in scoreboard.textbook_work(asked)]
+
+    every = names(None, 2, 1)
+    assert len(every) == 2 * len(textbook.STAGES) + len(textbook.MECHANICS)
+    assert every[:2] == [("clean", 10), ("clean", 11)]
     # a whole name means this stage alone, although it is also a part of another name
-    alone = [
-        values for _, values in scoreboard.textbook_work(argparse.Namespace(only="leak", textbook=1, seed=3))
-    ]
-    assert alone == [("leak", 3)]
+    assert names("leak", 1, 0) == [("leak", 10)]
+    assert names("dahl+creep", 0, 1) == [("dahl+creep", 10)]
+
+
+def test_one_of_several_names_is_enough() -> None:
+    def answer(found: str, after: float = 9.0) -> Result:
+        known = of_stage("dahl+creep", 2, "creep", found, after)
+        return replace(known, one_of=("friction", "hysteretic-stiffness"))
+
+    assert answer("friction creep").is_right() and answer("creep hysteretic-stiffness").is_right()
+    assert answer("creep").is_missed() and answer("friction").is_missed()
+    assert not answer("friction creep drift").is_right()
+    assert answer("", 1.0).is_right()
+    table = textbook_tables.by_stage([answer("friction creep"), answer("creep")])
+    assert list(table.rows)[0][1:5] == ("creep, friction or hysteretic-stiffness", "1 of 2", "0", "1")

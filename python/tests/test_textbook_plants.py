@@ -37,3 +37,20 @@ def test_no_simple_model_beats_that_of_a_slow_plant(name: str, seed: int) -> Non
     assert "integrates" not in (answer["verdict_reason"] or "")
     rivals = [rival["holdout_rms"] for rival in answer["rivals"]]
     assert found.after["holdout"]["rms"] < 0.25 * min(rivals)
+
+
+# The dynamics of the first two had negative poles, and their models diverged on another experiment. The third
+# has a mode at the mains frequency until the line itself is named.
+FORCES = [("duffing+nothing", 1000), ("duffing+nothing", 1002), ("duffing+mains", 1003)]
+
+
+@pytest.mark.parametrize(("name", "seed"), FORCES)
+def test_forces_are_named_beside_other_effects(name: str, seed: int) -> None:
+    label, run, other = textbook.MECHANICS[name], textbook.draw(name, seed), textbook.draw(name, seed, 1)
+    found = gpi.explain(gpi.Record(run.u, run.y, rate=run.rate))
+    assert set(found.effects) == label.must | label.one_of
+    assert found.after["holdout"]["rms"] < 1.1 * run.noise
+    assert min(pole.real for pole in found.model.linear.poles) > 0
+    again = found.model.error(gpi.Record(other.u, other.y, rate=other.rate), fit_start=True)["rms"]
+    # what is left of the mains depends on their phase, which no model knows
+    assert again < (1.2 if "nothing" in name else 12) * run.noise

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from plants import textbook
 from plants.excitation import stream
 from plants.hysteresis import play_bank
-from plants.textbook import loops, mechanics, process, sensing, slow
+from plants.textbook import combined, friction, loops, mechanics, process, sensing, slow
 from plants.textbook.drives import Drive
 from plants.textbook.linear import Mode, lag, modal_sum
 from plants.textbook.run import Run, ordinary
@@ -49,7 +49,7 @@ def test_the_simulator_does_not_know_the_package() -> None:
     assert len(textbook.STAGES) >= 21
 
 
-@pytest.mark.parametrize("name", textbook.STAGES)
+@pytest.mark.parametrize("name", [*textbook.STAGES, *textbook.MECHANICS])
 def test_a_seed_is_one_stage_and_one_experiment(name: str) -> None:
     one, same, again, other = (textbook.draw(name, *seeds) for seeds in ((4,), (4,), (4, 1), (5,)))
     assert np.array_equal(one.u, same.u) and np.array_equal(one.y, same.y)
@@ -87,6 +87,29 @@ def test_a_mass_without_friction_is_a_mode() -> None:
     linear = modal_sum(drive.unit, RATE, [Mode(drive.resonance, 0.05)])
     found = mechanics.sprung(drive, 0.05, Nothing(), 0.0)
     assert np.abs(found - linear).max() < 5e-3 * np.ptp(linear)
+
+
+def test_a_cubic_spring_gives_way_as_the_equation_of_its_rest_says() -> None:
+    element = friction.Power(0.1, 0.5)
+    rest = mechanics.sprung(drive_of(np.full(4000, 0.8)), 0.2, element, 6.0)[-1]
+    assert rest + 0.1 * rest**2 + 0.5 * rest**3 == pytest.approx(0.8, rel=1e-3)
+
+
+def test_what_is_put_beside_a_force_is_added_to_its_record() -> None:
+    drive = swing()
+    for name, (force, _) in combined.FORCES.items():
+        alone = force(stream(name, 1), drive)
+        warm, humming = (put(force)(stream(name, 1), drive) for put in (combined.warming, combined.humming))
+        assert np.array_equal(warm.u, drive.u) and np.array_equal(humming.u, drive.u)
+        # the mains follow the element's own numbers, heat and creep precede them
+        added = humming.y - alone.y
+        line = np.abs(np.fft.rfft(added)).argmax() * RATE / len(added)
+        assert min(abs(line - 50), abs(line - 60)) < 0.2 and 2.5 < added.std() / alone.noise < 12
+        assert np.ptp(warm.y) > 0
+    step = drive_of(np.concatenate([np.zeros(500), np.full(11_500, 0.5)]))
+    slow_part = combined.creeping(mechanics.dahl)(stream("dahl", 1), step).y
+    gone = (slow_part[11_000:].mean() - slow_part[2500:3500].mean()) / slow_part[11_000:].mean()
+    assert 0.001 < gone < 0.04
 
 
 def test_a_motor_sticks_below_its_friction_and_an_integrator_keeps_its_place() -> None:

@@ -16,10 +16,11 @@ from numpy.random import Generator
 
 from ..excitation import Array, stream
 from . import loops, mechanics, operators, process, sensing, slow
+from .combined import BESIDE, FORCES
 from .drives import Drive, drive
 from .run import Run
 
-__all__ = ["STAGES", "Record", "Stage", "draw", "is_in_motion"]
+__all__ = ["MECHANICS", "STAGES", "Record", "Stage", "draw", "is_in_motion"]
 
 MEMORY_IN_THE_FORCE = ("stiffness", "hysteretic-stiffness", "friction", "bouc-wen", "hysteresis-shape")
 
@@ -28,12 +29,14 @@ MEMORY_IN_THE_FORCE = ("stiffness", "hysteretic-stiffness", "friction", "bouc-we
 class Stage:
     """A stage, what an answer must name, and what it may name besides: any other name is false.
 
+    `one_of`: names of which one must be given, where the catalogue has several for the same law.
     `is_bipolar`: the drive goes to both sides of 0. `seconds`: least length of the record, for what is slow.
     """
 
     simulate: Callable[[Generator, Drive], Run]
     must: frozenset[str] = frozenset()
     may: frozenset[str] = frozenset()
+    one_of: frozenset[str] = frozenset()
     is_bipolar: bool = False
     seconds: float = 0.0
 
@@ -47,7 +50,8 @@ def stage(
     seconds: float = 0.0,
 ) -> Stage:
     """A stage with its label."""
-    return Stage(simulate, frozenset(must), frozenset(may), is_bipolar, seconds)
+    names = frozenset(must), frozenset(may)
+    return Stage(simulate, *names, is_bipolar=is_bipolar, seconds=seconds)
 
 
 STAGES: dict[str, Stage] = {
@@ -81,6 +85,15 @@ STAGES: dict[str, Stage] = {
     "bent": stage(sensing.bent, must=["output-nonlinearity"]),
 }
 
+#: Forces inside the mechanics, alone and beside another effect.
+MECHANICS: dict[str, Stage] = {
+    f"{name}+{other}": Stage(
+        put_beside(force), frozenset(effects), one_of=names, is_bipolar=True, seconds=12 if effects else 0
+    )
+    for name, (force, names) in FORCES.items()
+    for other, (put_beside, effects) in BESIDE.items()
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Record:
@@ -102,7 +115,7 @@ def is_in_motion(seed: int) -> bool:
 
 def draw(name: str, seed: int, number: int = 0) -> Record:
     """Experiment `number` on the stage `name` of a seed."""
-    kind = STAGES[name]
+    kind = (STAGES | MECHANICS)[name]
     random = stream("textbook " + name, seed)
     rate = float(random.choice([1000.0, 2000.0, 4000.0]))
     if kind.seconds:

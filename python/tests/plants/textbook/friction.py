@@ -1,4 +1,4 @@
-"""Friction elements, as forces that follow an imposed displacement.
+"""Springs and friction elements, as forces that follow an imposed displacement.
 
 Each has `step(dx, seconds)`: the force after a displacement dx within some seconds, at constant speed.
 """
@@ -15,6 +15,21 @@ class Element(Protocol):
     def step(self, dx: float, seconds: float) -> float:
         """The force after the displacement `dx`."""
         ...
+
+
+class Power:
+    """F = square x^2 + cube x^3: a spring beside the linear one [1].
+
+    1. Nayfeh, Mook, Nonlinear Oscillations, Wiley, 1979, ch. 2.
+    """
+
+    def __init__(self, square: float, cube: float) -> None:
+        self.square, self.cube, self.x = square, cube, 0.0
+
+    def step(self, dx: float, seconds: float) -> float:
+        """The force after the displacement `dx`."""
+        self.x += dx
+        return (self.square + self.cube * self.x) * self.x * self.x
 
 
 class Dahl:

@@ -9,7 +9,7 @@ from numpy.random import Generator
 
 from ..excitation import Array
 from .drives import Drive
-from .friction import BoucWen, Dahl, Element, LuGre, MaxwellSlip
+from .friction import BoucWen, Dahl, Element, LuGre, MaxwellSlip, Power
 from .linear import held
 from .run import Run, measured
 
@@ -41,6 +41,15 @@ def sprung(drive: Drive, damping: float, element: Element, stiffest: float) -> A
 def scaled(random: Generator, drive: Drive, x: Array) -> Run:
     """In um, with white noise."""
     return measured(random, drive, drive.travel * x)
+
+
+def duffing(random: Generator, drive: Drive) -> Run:
+    """A mass on a spring that is not linear (`Power`): Duffing's oscillator and a square."""
+    cube, square = random.uniform(0.2, 1.0), random.uniform(-0.2, 0.2)
+    element = Power(square, cube)
+    # the spring is stiffest where the mass moves by two travels
+    stiffest = 4 * abs(square) + 12 * cube
+    return scaled(random, drive, sprung(drive, random.uniform(0.03, 0.15), element, stiffest))
 
 
 def dahl(random: Generator, drive: Drive) -> Run:

@@ -114,21 +114,24 @@ def idle_columns(random: Generator, drive: Drive) -> Run:
     return Run(found.u, found.y, found.noise, sensed(drive, columns))
 
 
-def hum(random: Generator, drive: Drive) -> Run:
-    """An ordinary stage beside the mains: lines at f, 3 f, 5 f, f within 0.1 Hz of 50 or 60 Hz [1].
-
-    The first is 3 to 10 times the noise.
+def mains(random: Generator, drive: Drive, noise: float) -> Array:
+    """Lines at f, 3 f, 5 f, f within 0.1 Hz of 50 or 60 Hz, the first 3 to 10 times the noise [1].
 
     1. Horowitz, Hill, The Art of Electronics, 3rd ed., Cambridge University Press, 2015, ch. 8.
     """
-    x = ordinary(random, drive)
-    rms = noise_rms(random, drive)
     hertz = float(random.choice([50.0, 60.0])) + random.uniform(-0.1, 0.1)
-    size = random.uniform(3, 10) * np.sqrt(2) * rms
+    size = random.uniform(3, 10) * np.sqrt(2) * noise
     phases = drive.random("mains").uniform(0, 2 * np.pi, 3)
-    y = x + white(drive, rms)
+    lines = np.zeros(len(drive.u))
     for number, part, phase in zip(
         (1, 3, 5), (1.0, random.uniform(0, 0.4), random.uniform(0, 0.2)), phases, strict=True
     ):
-        y = y + size * part * np.sin(2 * np.pi * number * hertz * drive.t + phase)
-    return Run(drive.u, y, rms)
+        lines += size * part * np.sin(2 * np.pi * number * hertz * drive.t + phase)
+    return lines
+
+
+def hum(random: Generator, drive: Drive) -> Run:
+    """An ordinary stage beside the mains (`mains`)."""
+    x = ordinary(random, drive)
+    rms = noise_rms(random, drive)
+    return Run(drive.u, x + mains(random, drive, rms) + white(drive, rms), rms)
