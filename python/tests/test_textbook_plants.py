@@ -52,5 +52,5 @@ def test_forces_are_named_beside_other_effects(name: str, seed: int) -> None:
     assert found.after["holdout"]["rms"] < 1.1 * run.noise
     assert min(pole.real for pole in found.model.linear.poles) > 0
     again = found.model.error(gpi.Record(other.u, other.y, rate=other.rate), fit_start=True)["rms"]
-    # what is left of the mains depends on their phase, which no model knows
+    # the mains of another experiment, at most 11 times the noise, have a phase that no model knows
     assert again < (1.2 if "nothing" in name else 12) * run.noise

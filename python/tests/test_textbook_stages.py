@@ -100,12 +100,15 @@ def test_what_is_put_beside_a_force_is_added_to_its_record() -> None:
     for name, (force, _) in combined.FORCES.items():
         alone = force(stream(name, 1), drive)
         warm, humming = (put(force)(stream(name, 1), drive) for put in (combined.warming, combined.humming))
+        random = stream(name, 1)
+        size = random.uniform(8, 25)
+        cold = force(random, drive)
+        assert (warm.y - cold.y).std() == pytest.approx(size * cold.noise)
         assert np.array_equal(warm.u, drive.u) and np.array_equal(humming.u, drive.u)
-        # the mains follow the element's own numbers, heat and creep precede them
+        # the numbers of the mains are drawn behind those of the element, those of heat and creep before
         added = humming.y - alone.y
         line = np.abs(np.fft.rfft(added)).argmax() * RATE / len(added)
         assert min(abs(line - 50), abs(line - 60)) < 0.2 and 2.5 < added.std() / alone.noise < 12
-        assert np.ptp(warm.y) > 0
     step = drive_of(np.concatenate([np.zeros(500), np.full(11_500, 0.5)]))
     slow_part = combined.creeping(mechanics.dahl)(stream("dahl", 1), step).y
     gone = (slow_part[11_000:].mean() - slow_part[2500:3500].mean()) / slow_part[11_000:].mean()

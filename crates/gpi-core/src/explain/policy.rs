@@ -115,7 +115,7 @@ settings! {
         least: f64 = 0.02, PART;
         /// Most steps: a mode at a third of the sampling rate takes an eighth of a radian in one. By hand.
         most: usize = 16, FROM_ONE;
-        /// Steps of a model from which negative poles are taken: their error is a sixty-fourth of that of one step.
+        /// Steps of a model from which poles with a negative real part are taken: their error is a sixty-fourth of that of one step.
         instead_of_poles: usize = 8, FROM_ONE;
     }
 

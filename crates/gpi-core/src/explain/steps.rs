@@ -3,8 +3,9 @@
 //! No parameter is added to the model, so that the squares of the training samples decide. The steps are doubled as long as
 //! these fall.
 //!
-//! With one step a sample, a force acts half a sample late, and a pole of G that is negative can make up for it. No mode of the
-//! mechanics has such poles. A model without them and with several steps replaces such a model where it explains nearly as much.
+//! With one step a sample, a force acts half a sample late, and a pole of G with a negative real part can make up for it. A mode of the
+//! mechanics has such a pole only above a quarter of the sampling rate. A model without these poles and with several steps replaces
+//! such a model where it explains nearly as much.
 
 use super::state::SearchState;
 use crate::Error;
@@ -31,25 +32,37 @@ pub(super) fn finer_steps(state: &mut SearchState, progress: Progress) -> Result
         }
         let holds =
             if present.is_plain() { &[Hold::First, Hold::Zero][..] } else { &[present.hold] };
-        let mut best = None;
-        for &hold in holds {
-            let mut point = state.point.clone();
-            point.intersample = Intersample { substeps, hold };
-            let fitted =
-                state.fit(point, &state.setup.options, "steps between samples", progress)?;
-            let (point, cost) = (fitted.point, fitted.linearization.cost);
-            if cost < best.as_ref().map_or((1.0 - policy.least) * state.cost, |&(_, cost)| cost) {
-                best = Some((point, cost));
-            }
-        }
-        let Some((point, cost)) = best else { break };
-        (state.point, state.cost) = (point, cost);
+        let best = best_hold(state, &state.point, substeps, holds, progress)?;
+        let is_better = |best: &Fitted| best.linearization.cost < (1.0 - policy.least) * state.cost;
+        let Some(best) = best.filter(is_better) else { break };
+        (state.point, state.cost) = (best.point, best.linearization.cost);
         changed = true;
     }
     Ok(changed)
 }
 
-/// Takes sections with negative poles out of G, and computes the loops in several steps instead; says whether that explains nearly
+/// The best fit of a point with so many steps, of those with each hold.
+fn best_hold(
+    state: &SearchState,
+    point: &Point,
+    substeps: usize,
+    holds: &[Hold],
+    progress: Progress,
+) -> Result<Option<Fitted>, Error> {
+    let mut best: Option<Fitted> = None;
+    for &hold in holds {
+        let mut point = point.clone();
+        point.intersample = Intersample { substeps, hold };
+        let fitted = state.fit(point, &state.setup.options, "steps between samples", progress)?;
+        let cost = fitted.linearization.cost;
+        if best.as_ref().is_none_or(|best| cost < best.linearization.cost) {
+            best = Some(fitted);
+        }
+    }
+    Ok(best)
+}
+
+/// Takes sections out of G whose poles have a negative real part, and computes the loops in several steps instead; says whether that explains nearly
 /// as much.
 fn leave_fast_poles(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     if state.setup.order_is_given || !state.point.intersample.is_plain() {
@@ -60,16 +73,7 @@ fn leave_fast_poles(state: &mut SearchState, progress: Progress) -> Result<bool,
         return Ok(false);
     };
     let substeps = state.setup.policy.steps.instead_of_poles;
-    let mut best: Option<Fitted> = None;
-    for hold in [Hold::First, Hold::Zero] {
-        let mut point = slower.clone();
-        point.intersample = Intersample { substeps, hold };
-        let fitted = state.fit(point, &state.setup.options, "steps between samples", progress)?;
-        let cost = fitted.linearization.cost;
-        if best.as_ref().is_none_or(|best| cost < best.linearization.cost) {
-            best = Some(fitted);
-        }
-    }
+    let best = best_hold(state, &slower, substeps, &[Hold::First, Hold::Zero], progress)?;
     let Some(best) = best else { return Ok(false) };
     let is_enough = state.explains_nearly_as_much(&best)?;
     if is_enough {

@@ -74,7 +74,7 @@ impl<'a> Prepared<'a> {
         for (index, experiment) in experiments.iter_mut().enumerate() {
             // A warm-up ends the effect of the initial state, but not where plays are wider than the input's range.
             let is_hidden = experiment.warmup > 0 && fraction > 0.0;
-            if begins_at_rest(experiment, &settings.preparation) || is_hidden {
+            if is_quiet_at_first(experiment, &settings.preparation) || is_hidden {
                 continue;
             }
             has_unknown_state[index] = true;
@@ -259,10 +259,10 @@ pub(crate) fn require_match(model: &Model, record: &Record) -> Result<(), Error>
 
 /// Whether all inputs are zero for a while before anything moves.
 pub(crate) fn starts_at_rest(experiment: &Experiment) -> bool {
-    begins_at_rest(experiment, &PreparationSettings::default())
+    is_quiet_at_first(experiment, &PreparationSettings::default())
 }
 
-fn begins_at_rest(experiment: &Experiment, settings: &PreparationSettings) -> bool {
+fn is_quiet_at_first(experiment: &Experiment, settings: &PreparationSettings) -> bool {
     let &PreparationSettings { quiet, zero, .. } = settings;
     let input = &experiment.input;
     let largest = input.amax();
