@@ -105,7 +105,7 @@ bench-peers: $(NATIVE) ## Compare the run time with other tools and write docs/b
 	$(BIN)/python -m pip install --quiet --group peers
 	$(BIN)/python tools/bench_peers.py --markdown docs/benchmarks.md
 
-bench-scale: $(NATIVE) ## Print the time of identification as records and their experiments grow
+bench-scale: $(NATIVE) ## Print the time of explanations, and of identification as records and their experiments grow
 	$(BIN)/python tools/bench_scale.py
 
 figures: $(NATIVE) ## Print the figures of README (needs the measured data)

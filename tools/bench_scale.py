@@ -1,7 +1,9 @@
-"""Print how long `identify` takes as records and the number of their experiments grow.
+"""Print how long `identify` and `explain` take.
 
-The record is that of a simulated stage (`python/tests/plants.py`). It is cut into experiments of equal
-length, each of which begins in motion, so that each has an initial state of its own. `python
+`identify` is timed as records and the number of their experiments grow. Its record is that of a simulated
+stage (`python/tests/plants.py`). It is cut into experiments of equal length, each of which begins in motion,
+so that each has an initial state of its own. `explain` is timed on the demo record and on two records of
+`blind/dev` of the data folder (`GPI_DATA_DIR`, else `../shared`), with one and with three effects. `python
 tools/bench_scale.py --help` lists the options.
 """
 
@@ -15,6 +17,7 @@ import gpi_hammerstein as gpi
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "tests"))
 
 import plants
+from data_folder import DATA
 
 RATE = 1000.0
 
@@ -34,15 +37,36 @@ def seconds_of(record: gpi.Record) -> float:
     return time.perf_counter() - start
 
 
+def explained() -> None:
+    """Print the time of `explain` on a few records."""
+    dev = DATA / "blind" / "dev"
+    demo = Path(gpi.__file__).parent / "data" / "demo.csv.gz"
+    paths = [demo, *(dev / f"record-{number}.csv.gz" for number in ("05", "20"))]
+    print(f"{'record':>16} {'samples':>10} {'seconds':>9}  effects")
+    for path in paths:
+        if not path.is_file():
+            print(f"{path.name:>16}: not found, set GPI_DATA_DIR")
+            continue
+        record = gpi.read_record(path)
+        start = time.perf_counter()
+        found = gpi.explain(record)
+        taken = time.perf_counter() - start
+        effects = ", ".join(found.effects)
+        print(f"{path.name:>16} {record.samples:>10} {taken:>9.1f}  {effects}", flush=True)
+
+
 def main() -> None:
-    """Print the table."""
+    """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=20_000, help="samples of the record that is cut")
     parser.add_argument("--experiments", type=int, nargs="*", default=[1, 10, 100, 1000])
     parser.add_argument(
         "--long", type=int, nargs="*", default=[100_000, 1_000_000], help="samples of uncut records"
     )
+    parser.add_argument("--no-explain", action="store_true", help="time `identify` only")
     arguments = parser.parse_args()
+    if not arguments.no_explain:
+        explained()
     cases = [(arguments.samples, count) for count in arguments.experiments]
     cases += [(samples, 1) for samples in arguments.long]
     first = None

@@ -19,7 +19,9 @@
 use super::free_run::Signals;
 use super::point::{Past, Point};
 use crate::effects::{Added, Effect, Place, PlayCurves, Stage};
+use crate::parallel::install;
 use crate::{Error, Experiment, Matrix};
+use rayon::prelude::*;
 
 impl Point {
     /// Adds one signal, so many times.
@@ -49,7 +51,7 @@ impl Point {
             return Ok(gained);
         }
         let point = self.with_effect(effect.clone());
-        Ok(point.output_from(effect.stage(), known, experiment, index)? - here)
+        point.gain_from(effect.stage(), (known, here), experiment, index)
     }
 
     /// Derivatives of the output by the values of every effect whose own do not stream along: `[effect][value]`,
@@ -59,20 +61,26 @@ impl Point {
         experiment: &Experiment,
         index: usize,
     ) -> Result<Vec<Vec<Matrix>>, Error> {
-        let streams =
-            |effect: &Effect| matches!(effect.place(), Place::Curves(_) | Place::Loops(_));
-        if self.effects.iter().all(streams) {
-            return Ok(vec![Vec::new(); self.effects.len()]);
-        }
-        let known = self.signals(experiment, index)?;
-        let here = self.output_from(Stage::Added, &known, experiment, index)?;
+        let streams = |effect: &Effect| {
+            matches!(effect.place(), Place::Curves(_) | Place::Loops(_) | Place::Parallel(_))
+        };
+        let runs = |effect: &Effect| !streams(effect) && self.apart(effect).is_none();
+        let (known, here) = if self.effects.iter().any(runs) {
+            let known = self.signals(experiment, index)?;
+            let here = self.output(&known);
+            (known, here)
+        } else {
+            // an added signal has derivatives of its own alone
+            let here = Matrix::zeros(experiment.input.nrows(), self.dynamics.outputs());
+            (Signals::none(), here)
+        };
         let of = |(place, effect): (usize, &Effect)| {
             if streams(effect) {
                 return Ok(Vec::new());
             }
             self.columns_of(place, &known, &here, experiment, index)
         };
-        self.effects.iter().enumerate().map(of).collect()
+        install(|| self.effects.par_iter().enumerate().map(of).collect())
     }
 
     /// The same of one effect; `here` is the output.
@@ -89,21 +97,21 @@ impl Point {
         if let Place::Parallel(_) = effect.place() {
             return Ok(Vec::new());
         }
-        let steps = block.steps();
+        let (steps, values) = (block.steps(), block.values());
         if let Place::Curves(curves) = effect.place() {
             let input = curves.input();
             let slopes = self.reading_slopes_of(curves, &known.drive, &self.pasts[index]);
             let column = |(step, slope): (f64, nalgebra::RowDVector<f64>)| {
                 let mut moved = known.clone();
                 moved.intermediate.column_mut(input).axpy(step, &slope.transpose(), 1.0);
-                let there = self.output_from(Stage::Dynamics, &moved, experiment, index)?;
-                Ok((there - here) / step)
+                Ok(self.gain_from(Stage::Dynamics, (&moved, here), experiment, index)? / step)
             };
             let rows = slopes.row_iter().map(nalgebra::Matrix::into_owned);
-            return steps.into_iter().zip(rows).map(column).collect();
+            let pairs: Vec<_> = steps.into_iter().zip(rows).collect();
+            return install(|| pairs.into_par_iter().map(column).collect());
         }
         let column = |(number, step): (usize, f64)| {
-            let mut values = block.values();
+            let mut values = values.clone();
             values[number] += step;
             let mut moved = self.clone();
             moved.effects[place].set(&values);
@@ -114,10 +122,9 @@ impl Point {
                 self.add_one(own, experiment, -1.0 / step, &mut column);
                 return Ok(column);
             }
-            let there = moved.output_from(effect.stage(), known, experiment, index)?;
-            Ok((there - here) / step)
+            Ok(moved.gain_from(effect.stage(), (known, here), experiment, index)? / step)
         };
-        steps.into_iter().enumerate().map(column).collect()
+        install(|| steps.into_par_iter().enumerate().map(column).collect())
     }
 
     /// Derivatives of v by the values of all curves through which plays are read, (values, samples) each.

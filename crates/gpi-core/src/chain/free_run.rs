@@ -9,7 +9,8 @@
 //! | [`Stage::Input`] | u | drive, v, displacement, output |
 //! | [`Stage::Plays`] | drive | v, displacement, output |
 //! | [`Stage::Dynamics`] | v | displacement, output |
-//! | all later stages | displacement | output |
+//! | [`Stage::Output`] | displacement and what is added to it | output |
+//! | what is added | displacement | what is added, output |
 //!
 //! A free run depends on the input and on the initial state only, never on the measured output. The displacement begins
 //! in the steady state of v(0); at the end of the warm-up the unknown part of the initial state is added to x. The dead
@@ -83,24 +84,27 @@ impl Point {
         experiment: &Experiment,
         past: &Past,
     ) -> Result<Matrix, Error> {
-        let mut displacement = Matrix::zeros(v.nrows(), self.dynamics.outputs());
         let mut motion = Motion::new(self);
         // behind the dead time of G
-        let late = |k: usize| v.row(k.saturating_sub(self.dynamics.delay).min(v.nrows() - 1));
-        let mut now: Vec<f64> = late(0).iter().copied().collect();
-        let mut next = now.clone();
-        motion.stand(&now);
-        for k in 0..v.nrows() {
-            if k == experiment.warmup && past.has_unknown_state {
-                motion.state.iter_mut().zip(past.state.iter()).for_each(|(x, own)| *x += own);
+        let (samples, delay) = (v.nrows(), self.dynamics.delay);
+        let late =
+            Matrix::from_fn(v.ncols(), samples, |input, k| v[(k.saturating_sub(delay), input)]);
+        let at = |k: usize| late.column(k.min(samples - 1)).data.into_slice();
+        motion.stand(at(0));
+        let jump = past.has_unknown_state.then_some((experiment.warmup, past.state.as_slice()));
+        if self.loops().next().is_none() {
+            return Ok(motion.respond(&late, jump).transpose());
+        }
+        let mut displacement = Matrix::zeros(samples, self.dynamics.outputs());
+        for k in 0..samples {
+            if let Some((_, jump)) = jump.filter(|(at, _)| *at == k) {
+                motion.state.iter_mut().zip(jump).for_each(|(x, own)| *x += own);
             }
-            next.iter_mut().zip(late(k + 1).iter()).for_each(|(next, v)| *next = *v);
-            motion.observe(&now);
+            motion.observe(at(k));
             for (output, y) in motion.displacement.iter().enumerate() {
                 displacement[(k, output)] = *y;
             }
-            motion.advance(&now, &next);
-            now.copy_from_slice(&next);
+            motion.advance(at(k), at(k + 1));
         }
         Ok(displacement)
     }
@@ -126,7 +130,31 @@ impl Point {
         let drive = self.drive(experiment);
         let intermediate = self.intermediate(&drive, past);
         let displacement = self.displacement(&intermediate, experiment, past)?;
-        Ok(Signals { drive, intermediate, displacement })
+        let added = self.added(experiment);
+        Ok(Signals { drive, intermediate, displacement, added })
+    }
+
+    /// What effects add before the output stage and after it, each (samples, outputs).
+    fn added(&self, experiment: &Experiment) -> [Matrix; 2] {
+        let stages = self.stages();
+        [true, false].map(|moves_stage| {
+            let mut added = Matrix::zeros(experiment.input.nrows(), self.dynamics.outputs());
+            stages.add(&mut stages.memories(), moves_stage, &experiment.covariates, &mut added);
+            added
+        })
+    }
+
+    /// The output (samples, outputs) without its offsets, of a displacement and of what is added before and after the output stage.
+    fn reading(&self, mut displacement: Matrix, [before, after]: &[Matrix; 2]) -> Matrix {
+        let stages = self.stages();
+        displacement += before;
+        stages.sense(&mut stages.memories(), &mut displacement);
+        displacement + after
+    }
+
+    /// The output (samples, outputs) without its offsets.
+    pub(crate) fn output(&self, signals: &Signals) -> Matrix {
+        self.reading(signals.displacement.clone(), &signals.added)
     }
 
     /// The output (samples, outputs) without its offsets, from the stage on at which `known` ends.
@@ -137,22 +165,44 @@ impl Point {
         experiment: &Experiment,
         index: usize,
     ) -> Result<Matrix, Error> {
+        let displacement = self.displacement_from(stage, known, experiment, index)?;
+        if matches!(stage, Stage::Displaced | Stage::Added) {
+            return Ok(self.reading(displacement, &self.added(experiment)));
+        }
+        Ok(self.reading(displacement, &known.added))
+    }
+
+    /// The displacement (samples, outputs), from the stage on at which `known` ends.
+    fn displacement_from(
+        &self,
+        stage: Stage,
+        known: &Signals,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Matrix, Error> {
         let past = &self.pasts[index];
-        let mut output = match stage {
-            Stage::Input => {
-                let v = self.intermediate(&self.drive(experiment), past);
-                self.displacement(&v, experiment, past)?
-            }
-            Stage::Plays => {
-                let v = self.intermediate(&known.drive, past);
-                self.displacement(&v, experiment, past)?
-            }
-            Stage::Dynamics => self.displacement(&known.intermediate, experiment, past)?,
-            _ => known.displacement.clone(),
+        let v = match stage {
+            Stage::Input => self.intermediate(&self.drive(experiment), past),
+            Stage::Plays => self.intermediate(&known.drive, past),
+            Stage::Dynamics => return self.displacement(&known.intermediate, experiment, past),
+            _ => return Ok(known.displacement.clone()),
         };
-        let stages = self.stages();
-        stages.read(&mut stages.memories(), &experiment.covariates, &mut output);
-        Ok(output)
+        self.displacement(&v, experiment, past)
+    }
+
+    /// What the output gains by a change of this point at a stage: its output less that of the point whose signals are `known`
+    /// and whose output is `here`. Without an output stage, that is the change of the displacement.
+    pub(crate) fn gain_from(
+        &self,
+        stage: Stage,
+        (known, here): (&Signals, &Matrix),
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Matrix, Error> {
+        if self.senses() || stage > Stage::Dynamics {
+            return Ok(self.output_from(stage, known, experiment, index)? - here);
+        }
+        Ok(self.displacement_from(stage, known, experiment, index)? - &known.displacement)
     }
 
     /// Measured minus simulated outputs of each experiment, (samples, outputs), warm-ups included.
@@ -161,8 +211,7 @@ impl Point {
         let residual = |(index, (experiment, offsets)): (usize, (&Experiment, &Matrix))| {
             let samples = experiment.input.nrows();
             let known = self.signals(experiment, index)?;
-            let output = self.output_from(Stage::Added, &known, experiment, index)?;
-            let mut residual = &experiment.output - output;
+            let mut residual = &experiment.output - self.output(&known);
             for k in 0..samples {
                 for (knot, weight) in hats(k, samples, offsets.nrows()) {
                     let mut row = residual.row_mut(k);
@@ -210,6 +259,14 @@ impl Point {
     }
 }
 
+impl Signals {
+    /// Of no samples, where none are asked for.
+    pub(crate) fn none() -> Self {
+        let none = || Matrix::zeros(0, 0);
+        Self { drive: none(), intermediate: none(), displacement: none(), added: [none(), none()] }
+    }
+}
+
 /// Signals along the chain, each (samples, channels).
 #[derive(Clone)]
 pub(crate) struct Signals {
@@ -219,4 +276,6 @@ pub(crate) struct Signals {
     pub intermediate: Matrix,
     /// What the dynamics make of it.
     pub displacement: Matrix,
+    /// What effects add before the output stage and after it.
+    pub added: [Matrix; 2],
 }

@@ -19,7 +19,7 @@
 
 use super::plays::Plays;
 use crate::effects::{Effect, PlayCurves};
-use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
+use crate::operators::{Deadzones, Gpi, Operator, PlayBank, Reading};
 use crate::{Hysteresis, Matrix};
 
 /// What a bank consists of, which is the sign of its weights: `v = p_0 z + sum_i p_i F_i(z)` with `p_0 >= 0`, and `p_i >= 0`
@@ -142,8 +142,12 @@ impl Parameters {
 
     /// Smallest and largest z of samples of u, with u = 0 before the first.
     pub(crate) fn envelope_range(&self, u: impl Iterator<Item = f64>) -> (f64, f64) {
-        let mut previous = 0.0;
-        u.map(|value| self.envelope(std::mem::replace(&mut previous, value), value))
+        let mut z: Vec<f64> = u.collect();
+        if self.through_envelope(&mut z).is_none() {
+            let mut previous = 0.0;
+            z.iter_mut().for_each(|z| *z = self.envelope(std::mem::replace(&mut previous, *z), *z));
+        }
+        z.into_iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)))
     }
 
@@ -165,9 +169,40 @@ impl Parameters {
     }
 
     /// Replaces samples of u by those of v; `start` as in [`Sensitivity`](super::sensitivity::Sensitivity).
+    ///
+    /// Plays that no effect acts on are computed by the operators, whose cost hardly grows with their number.
     pub(crate) fn apply(&self, start: Option<&[f64]>, plays: Plays, signal: &mut [f64]) {
+        if plays.are_plain() && self.apply_operators(start, &plays.places, signal).is_some() {
+            return;
+        }
         let u = signal.to_vec();
         self.run(start, plays, &u, &mut |k, plays, z| signal[k] = plays.step(z, |_, _| {}));
+    }
+
+    /// Replaces samples of u by those of z, with u = 0 before the first; `None`, with the signal as it was, where the parameters are none of an operator.
+    fn through_envelope(&self, signal: &mut [f64]) -> Option<()> {
+        let zones = (self.thresholds.clone(), self.slopes.clone());
+        let envelope = Deadzones::new(zones.0, zones.1, self.reading).ok()?;
+        envelope.in_place(&mut envelope.rest(), signal);
+        Some(())
+    }
+
+    /// The same by the operators, for plays that begin at these places; `None`, with the signal as it was, where the parameters are none of an operator.
+    fn apply_operators(
+        &self,
+        start: Option<&[f64]>,
+        places: &[f64],
+        signal: &mut [f64],
+    ) -> Option<()> {
+        let bank = PlayBank::new(self.half_widths.clone(), self.weights.clone()).ok()?;
+        let first = self.envelope(0.0, *signal.first()?);
+        let sided = |sides: &[f64]| {
+            sides.iter().zip(&self.half_widths).map(|(side, r)| first + side * r).collect()
+        };
+        let mut state = bank.state_from(start.map_or_else(|| places.to_vec(), sided)).ok()?;
+        self.through_envelope(signal)?;
+        bank.in_place(&mut state, signal);
+        Some(())
     }
 
     /// Derivatives of v by the values of curves through which the plays are read, (values, samples):
@@ -207,6 +242,40 @@ impl Parameters {
                 plays.stand(z, sides);
             }
             step(k, &mut plays, z);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn operators_give_what_the_definition_gives() {
+        let u: Vec<f64> = (0..3000)
+            .map(|k| 2.0 * (0.013 * f64::from(k)).sin() + (0.4 * f64::from(k)).cos())
+            .collect();
+        for reading in [Reading::OneSided, Reading::Directional] {
+            let parameters = Parameters {
+                elements: Elements::Plays,
+                reading,
+                thresholds: vec![0.0, -0.7, 0.6],
+                slopes: vec![1.1, 0.3, -0.4],
+                // in the order in which a fit has moved them
+                half_widths: vec![0.0, 0.8, 0.31],
+                weights: vec![1.0, 0.5, 0.7],
+                prior: Prior::default(),
+            };
+            for start in [None, Some(&[0.0, 0.9, -0.3][..])] {
+                let plays = || parameters.plays(&[], 0, 1.0);
+                let (mut found, mut expected) = (u.clone(), u.clone());
+                parameters.apply_operators(start, &plays().places, &mut found).unwrap();
+                let mut step =
+                    |k: usize, plays: &mut Plays, z| expected[k] = plays.step(z, |_, _| {});
+                parameters.run(start, plays(), &u, &mut step);
+                let mut pairs = found.iter().zip(&expected);
+                assert!(pairs.all(|(found, expected)| (found - expected).abs() < 1e-12));
+            }
         }
     }
 }

@@ -76,7 +76,7 @@ impl<'a> Stages<'a> {
         self.add(memories, false, covariates, signal);
     }
 
-    fn sense(&self, memories: &mut [Vec<f64>], signal: &mut Matrix) {
+    pub(crate) fn sense(&self, memories: &mut [Vec<f64>], signal: &mut Matrix) {
         for (effect, memory) in self.at(memories, Place::output_stage) {
             let mut column = signal.column_mut(effect.output());
             if memory.is_empty() {

@@ -36,7 +36,7 @@ use super::lanes::{LANES, NONE, Weights, add};
 use super::motion::{advance_tangent, columns, rows};
 use super::point::Point;
 use super::table::{Group, Table};
-use super::tiles::{Shape, Tile, tiles};
+use super::tiles::{Entry, Shape, Tile, tiles};
 use crate::effects::{InnerLoop, OutputStage, Sees, Slope};
 use crate::linear::Section;
 use crate::parallel::install;
@@ -175,8 +175,9 @@ impl<'a> Tangents<'a> {
             let signals = &trace.signals[k * self.signals.len..(k + 1) * self.signals.len];
             let work = &mut tile.work[..];
             work.fill(NONE);
-            for one in &tile.injections {
-                work[one.place][one.unknown - tile.first] += one.factor * signals[one.signal];
+            for Entry { place, signals: own, factors } in &tile.entries {
+                let change = std::array::from_fn(|lane| factors[lane] * signals[own[lane]]);
+                add(simd, &mut work[*place], 1.0, &change);
             }
             let sample = trace.samples.start + k;
             if sample == 0 {

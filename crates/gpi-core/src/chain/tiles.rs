@@ -10,7 +10,7 @@
 //! of G, and every tile runs through all sections. An unknown without injection, such as an offset, is in a tile only
 //! if a neighbour has one; its lane stays zero and its derivatives are written by `Stream::added` afterwards.
 
-use super::injections::{Injection, Places};
+use super::injections::{Injection, ONE, Places};
 use super::lanes::{LANES, Lanes, NONE};
 use crate::effects::InnerLoop;
 use crate::linear::Section;
@@ -19,7 +19,7 @@ use std::ops::Range;
 /// Some unknowns side by side, and their changes.
 pub(super) struct Tile {
     pub first: usize,
-    pub injections: Vec<Injection>,
+    pub entries: Vec<Entry>,
     /// Unknowns that start as a state, and that state.
     pub starts: Vec<(usize, usize)>,
     /// Whether v changes.
@@ -35,6 +35,34 @@ pub(super) struct Tile {
     pub work: Vec<Lanes>,
     /// Of each output, by scored samples.
     pub rows: Vec<Vec<Lanes>>,
+}
+
+/// What unknowns side by side add at one place: a factor times a signal each.
+///
+/// All of them are added at once. Added one after the other, each would wait until the one before has reached the memory.
+pub(super) struct Entry {
+    pub place: usize,
+    pub signals: [usize; LANES],
+    pub factors: Lanes,
+}
+
+/// The injections of a tile, whose first unknown is `first`, side by side.
+fn entries(injections: &[Injection], first: usize) -> Vec<Entry> {
+    let mut entries: Vec<Entry> = Vec::new();
+    for one in injections {
+        let lane = one.unknown - first;
+        let is_open = |entry: &&mut Entry| entry.place == one.place && entry.factors[lane] == 0.0;
+        if let Some(entry) = entries.iter_mut().find(is_open) {
+            entry.signals[lane] = one.signal;
+            entry.factors[lane] = one.factor;
+            continue;
+        }
+        let mut entry = Entry { place: one.place, signals: [ONE; LANES], factors: NONE };
+        entry.signals[lane] = one.signal;
+        entry.factors[lane] = one.factor;
+        entries.push(entry);
+    }
+    entries
 }
 
 /// What the tiles of an experiment have in common.
@@ -73,7 +101,7 @@ pub(super) fn tiles(
         let (sections, states) = moving(sections, &moved, everything);
         Tile {
             first,
-            injections,
+            entries: entries(&injections, first),
             starts,
             drives,
             sections,
@@ -85,7 +113,7 @@ pub(super) fn tiles(
             rows: vec![Vec::new(); places.y.len()],
         }
     };
-    let is_active = |tile: &Tile| !tile.injections.is_empty() || !tile.starts.is_empty();
+    let is_active = |tile: &Tile| !tile.entries.is_empty() || !tile.starts.is_empty();
     (0..unknowns).step_by(LANES).map(tile).filter(is_active).collect()
 }
 

@@ -208,7 +208,7 @@ impl Added for PeriodicDisturbance {
             let phase = std::f64::consts::TAU * self.frequency * moment.time;
             (state[2], state[1]) = phase.sin_cos();
         }
-        state[0] = (state[0] + 1.0) % TURNS;
+        state[0] = if state[0] + 1.0 < TURNS { state[0] + 1.0 } else { 0.0 };
         let [cosine, sine] = [state[1], state[2]];
         state[1] = cosine * state[3] - sine * state[4];
         state[2] = sine * state[3] + cosine * state[4];

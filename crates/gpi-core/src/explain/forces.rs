@@ -49,7 +49,8 @@ pub(super) fn forces(
     let Some(linear) = linear.as_ref().and_then(dynamics) else { return Ok(Vec::new()) };
     let mut found = Vec::new();
     for &entry in state.setup.allowed.iter().filter(|entry| entry.stage == Stage::Dynamics) {
-        if state.refused.iter().any(|rejected| rejected.effect == entry.name) {
+        let is_refused = state.refused.iter().any(|rejected| rejected.effect == entry.name);
+        if is_refused || state.out_of_reach.contains(entry.name) {
             continue;
         }
         let Some((own, mut effect)) = best(state, &linear, entry) else { continue };
@@ -64,6 +65,20 @@ pub(super) fn forces(
     }
     found.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
     Ok(found)
+}
+
+/// Remembers the forces whose fits ended so far above the model that other effects beside them change nothing about it.
+pub(super) fn remember_out_of_reach(
+    state: &mut SearchState,
+    trials: &[Trial],
+) -> Result<(), Error> {
+    if state.integrates()? {
+        return Ok(());
+    }
+    let most = state.setup.policy.balance.out_of_reach * state.cost;
+    let is_far_above = |trial: &&Trial| trial.is_far && (trial.cost > most || trial.cost.is_nan());
+    state.out_of_reach.extend(trials.iter().filter(is_far_above).map(|trial| trial.entry.name));
+    Ok(())
 }
 
 /// The squares of the balance of forces without an effect and with it: of the training data, and of each held-out block.

@@ -182,6 +182,9 @@ settings! {
         /// The part of the squares that forces must explain. By hand: a fit that begins at a force which is not there costs time, but no
         /// name.
         least: f64 = 0.15, PART;
+        /// The squares of a fit that began at a force, over those of the model, from which on the force is not asked for again beside other
+        /// effects: most effects lower the squares of both by the same amount, so that the fit stays behind. By hand: twice the rms error.
+        out_of_reach: f64 = 4.0, FROM_ONE;
     }
 
     /// Which trial is accepted, see [`judgement`](super::judgement).
@@ -401,8 +404,8 @@ pub(super) mod score {
     pub(in crate::explain) const OWN_RANK: f64 = 1e-9;
     /// A column of which the projection leaves a smaller part is in the span of the model's sensitivities.
     pub(in crate::explain) const LEFT: f64 = 1e-7;
-    /// Numbers that the columns held at once may take: 96 MB.
-    pub(in crate::explain) const AT_ONCE: usize = 12_000_000;
+    /// Numbers that the columns held at once may take: 200 MB. Each time, the derivatives of the model are streamed once more.
+    pub(in crate::explain) const AT_ONCE: usize = 25_000_000;
     /// Probes beyond which all derivatives together take less time than single simulations. By hand.
     pub(in crate::explain) const MANY: usize = 50;
 }

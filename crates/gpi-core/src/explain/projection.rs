@@ -27,7 +27,7 @@ use super::base::Base;
 use crate::chain::free_run::Signals;
 use crate::chain::stream::{Rows, Stream};
 use crate::chain::table::Group;
-use crate::effects::{Effect, Proposal, Stage};
+use crate::effects::{Effect, Proposal};
 use crate::fit::gather::{gather, whitened};
 use crate::fit::problem::Estimation;
 use crate::optimize::{LeastSquares, Linearization};
@@ -60,7 +60,7 @@ impl Base<'_> {
         let mut with_residual = DVector::zeros(n);
         for (index, experiment) in self.record.experiments().iter().enumerate() {
             let known = &self.signals[index];
-            let here = self.point.output_from(Stage::Added, known, experiment, index)?;
+            let here = self.point.output(known);
             let columns = columns(known, &here, experiment, index)?.into_iter();
             let columns: Vec<Matrix> =
                 columns.map(|column| whitened(column, experiment, self.loss)).collect();

@@ -63,8 +63,9 @@ pub(super) fn drop_superfluous(state: &mut SearchState, progress: Progress) -> R
             place += 1;
             continue;
         }
+        let goal = state.cost * (newest.threshold / state.prepared.values()).exp();
         let fitted = as_trial(progress, ("examination", name), (0, 1), |progress| {
-            without(state, place, newest.entry, progress)
+            without(state, place, newest.entry, goal, progress)
         })?;
         let lost = state.prepared.values() * (fitted.linearization.cost / state.cost).ln();
         let now = state.held_out(&state.point)?;
@@ -132,22 +133,23 @@ pub(super) fn shed_sections(state: &mut SearchState, progress: Progress) -> Resu
 }
 
 /// The best fit without one of the effects. The newest effect is also started from the score test again, because in the
-/// presence of the dropped one it may have moved to where no fit leads back from.
+/// presence of the dropped one it may have moved to where no fit leads back from. Squares above `goal` are not asked for.
 fn without(
     state: &SearchState,
     place: usize,
     newest: &'static Entry,
+    goal: f64,
     progress: Progress,
 ) -> Result<Fitted, Error> {
     let without = state.point.without_effect(place);
-    let (refitted, _) = fitted(state, without.clone(), newest, progress)?;
+    let (refitted, _) = fitted(state, without.clone(), newest, goal, progress)?;
     let own = without.effects.iter().rposition(|effect| effect.name() == newest.name);
     let Some(own) = own.filter(|_| newest.driven) else { return Ok(refitted) };
     let point = without.without_effect(own);
     let best = scored_beside(state, &point, &[newest], progress)?.into_iter().next();
     let Some(best) = best else { return Ok(refitted) };
     let start = start(state, &point, best.score)?;
-    let (anew, _) = fitted(state, start, newest, progress)?;
+    let (anew, _) = fitted(state, start, newest, goal, progress)?;
     let is_better = anew.linearization.cost < refitted.linearization.cost;
     Ok(if is_better { anew } else { refitted })
 }

@@ -3,7 +3,7 @@
 use super::examination::{doubt, examine};
 use super::exchange::{exchange_slow, prefer_driven};
 use super::force_at_input::enter_with_input;
-use super::forces::{Balanced, balanced, forces};
+use super::forces::{Balanced, balanced, forces, remember_out_of_reach};
 use super::grid::refine_grids;
 use super::judgement::{Evidence, Refusal, choose, judge, refusal};
 use super::probability::probabilities;
@@ -111,6 +111,7 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     for tried in trials_of(state, best, progress)? {
         tried.map_or_else(|one| failed.push(one), |trial| trials.push(trial));
     }
+    remember_out_of_reach(state, &trials)?;
     // one that diverges on what is held out predicts nothing
     trials.retain(|trial| trial.held_out.iter().all(|squares| squares.is_finite()));
     // by what is explained beyond the significance threshold

@@ -53,6 +53,8 @@ pub(super) struct Trial {
     pub promised: f64,
     /// Whether the input makes it explain what it does, where it is an effect that the input drives.
     pub is_driven: bool,
+    /// Whether its fit began far from the present model.
+    pub is_far: bool,
 }
 
 /// An effect that was tried and not taken.
@@ -118,6 +120,8 @@ pub(super) struct SearchState<'a> {
     pub refused: Vec<Rejected>,
     /// Names of the effects beside which the balance of forces was asked last.
     pub balanced_beside: Option<Vec<&'static str>>,
+    /// Effects whose fits from the balance of forces ended far above the model.
+    pub out_of_reach: BTreeSet<&'static str>,
     /// Whether the output integrates the input, once that was asked.
     integrates: OnceLock<bool>,
 }
@@ -138,6 +142,7 @@ impl<'a> SearchState<'a> {
             last: Vec::new(),
             refused: Vec::new(),
             balanced_beside: None,
+            out_of_reach: BTreeSet::new(),
             integrates: OnceLock::new(),
         }
     }
@@ -157,6 +162,7 @@ impl<'a> SearchState<'a> {
             last: self.last.clone(),
             refused: self.refused.clone(),
             balanced_beside: None,
+            out_of_reach: self.out_of_reach.clone(),
             integrates: self.integrates.clone(),
         };
         same.cost = same.training_squares(&same.point)?;

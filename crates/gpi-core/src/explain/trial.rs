@@ -77,39 +77,46 @@ pub(super) fn trial(
     Ranked { entry, score, start: given, .. }: Ranked,
     progress: Progress,
 ) -> Result<Trial, Error> {
-    let gain = score.gain;
+    let (gain, is_far) = (score.gain, given.is_some());
     let (fitted, options) = match given {
         Some(given) => {
             let steps = state.setup.policy.fits.far_steps;
-            let options = FitOptions { steps, ..state.setup.options.clone() };
+            // where the output integrates, the balance of forces decides, whatever the squares
+            let goal = if state.integrates()? { 0.0 } else { state.cost };
+            let options = FitOptions { steps, goal, ..state.setup.options.clone() };
             (state.fit(given, &options, entry.name, progress)?, options)
         }
-        None => fitted(state, start(state, &state.point, score)?, entry, progress)?,
+        None => fitted(state, start(state, &state.point, score)?, entry, ANY, progress)?,
     };
     let trial = measured(state, &state.point, entry, fitted, options, gain, progress)?;
+    let trial = Trial { is_far, ..trial };
     reached(progress, entry.name, (trial.cost / state.prepared.values()).sqrt())?;
     if entry.stage != Stage::Plays || trial.deviance <= trial.threshold {
         return Ok(trial);
     }
     // what the same fit gains without the effect is not the effect's
-    let (without, _) = self::fitted(state, state.point.clone(), entry, progress)?;
+    let (without, _) = self::fitted(state, state.point.clone(), entry, ANY, progress)?;
     let gained = state.cost / without.linearization.cost.max(f64::MIN_POSITIVE);
     let deviance = trial.deviance - state.prepared.values() * gained.ln().max(0.0);
     Ok(Trial { deviance, ..trial })
 }
 
-/// A point with `entry` as its newest effect, fitted jointly, and what was free at last.
+/// The goal of a fit whose squares are of use whatever they are.
+pub(super) const ANY: f64 = 0.0;
+
+/// A point with `entry` as its newest effect, fitted jointly, and what was free at last. Squares above `goal` are not asked for.
 pub(super) fn fitted(
     state: &SearchState,
     start: Point,
     entry: &Entry,
+    goal: f64,
     progress: Progress,
 ) -> Result<(Fitted, FitOptions), Error> {
-    let mut options = state.setup.options.clone();
+    let mut options = FitOptions { goal, ..state.setup.options.clone() };
     let mut fitted = state.fit(start, &options, entry.name, progress)?;
     if entry.stage == Stage::Plays {
         // the grid was placed to replace what the plays lacked
-        options = state.setup.moving_grids.clone();
+        options = FitOptions { goal, ..state.setup.moving_grids.clone() };
         fitted = state.fit(fitted.point, &options, entry.name, progress)?;
     }
     fitted = continued(state, fitted, &options, entry, progress)?;
@@ -202,7 +209,19 @@ pub(super) fn measured(
     let held_out = state.held_out(&point)?;
     let rms = state.rms(&point)?;
     let is_driven = is_driven(state, without, &point)?;
-    Ok(Trial { entry, point, cost, deviance, threshold, held_out, rms, promised, is_driven })
+    let is_far = false;
+    Ok(Trial {
+        entry,
+        point,
+        cost,
+        deviance,
+        threshold,
+        held_out,
+        rms,
+        promised,
+        is_driven,
+        is_far,
+    })
 }
 
 /// What a deviance must exceed, with the autocorrelation of the residual of a fit where that matters.

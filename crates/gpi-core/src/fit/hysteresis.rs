@@ -115,7 +115,7 @@ pub fn fit_hysteresis(
     let settings = HysteresisSettings::default();
     settings.validate()?;
     let HysteresisSettings { steps, gain } = settings;
-    let options = FitOptions { freedom, loss: Loss::squares(1), steps, gain };
+    let options = FitOptions { freedom, loss: Loss::squares(1), steps, gain, goal: 0.0 };
     let mut overall = Overall::new(progress, 1.0, 1.0, 1.0);
     let mut progress = |report: &Report| overall.take(report);
     let fitted = fit(point, &record, &options, "hysteresis", &mut progress)?;

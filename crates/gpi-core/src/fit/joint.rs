@@ -57,6 +57,7 @@ pub(crate) fn fit_options(
         loss: Loss::squares(prepared.means.len()),
         steps,
         gain: (gain / prepared.values()).clamp(least_gain, largest_gain),
+        goal: 0.0,
     }
 }
 

@@ -30,6 +30,8 @@ pub(crate) struct FitOptions {
     pub steps: usize,
     /// A step that is predicted and found to gain less than this fraction of the cost is the last.
     pub gain: f64,
+    /// The cost above which nobody asks for the fit, zero where any is of use.
+    pub goal: f64,
 }
 
 impl Fitted {
@@ -68,8 +70,8 @@ pub(crate) fn fit(
     progress: Progress,
 ) -> Result<Fitted, Error> {
     let problem = Estimation::new(&point, record, options.freedom, &options.loss);
-    let (steps, gain) = (options.steps, options.gain);
-    let settings = SolverSettings { steps, gain, ..SolverSettings::default() };
+    let FitOptions { steps, gain, goal, .. } = *options;
+    let settings = SolverSettings { steps, gain, goal, ..SolverSettings::default() };
     let mut check = |done: f64| report(progress, phase, done);
     let Minimum { point, mut linearization, history, status } =
         levenberg_marquardt(&problem, point, &settings, &mut check)?;

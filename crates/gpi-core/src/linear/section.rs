@@ -27,6 +27,7 @@ pub(crate) struct Section {
 }
 
 /// Moves the state of a section in observer form on by one sample, with what drives each of its states.
+#[inline]
 pub(crate) fn advance(a: &[f64], state: &mut [f64], driven: impl Fn(usize) -> f64) {
     match (a, state) {
         ([a1, a2], [x1, x2]) => {

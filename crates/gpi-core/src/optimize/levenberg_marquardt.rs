@@ -12,7 +12,7 @@ pub enum Status {
     /// Steps that should lower the cost do not, however short. The cost has a kink here, where a play begins to
     /// turn at another sample, or the remaining gain is smaller than rounding errors.
     Stalled,
-    /// The largest number of steps was taken.
+    /// The largest number of steps was taken, or those that are left would not be enough.
     Limit,
 }
 
@@ -43,7 +43,8 @@ pub(crate) struct Minimum<P> {
 /// Each step minimises the quadratic model within the bounds, with the diagonal of the Gram matrix raised by the
 /// damping for unknowns in which the residuals are not linear. An accepted step lowers the damping as far as the
 /// prediction was right (H. B. Nielsen, 1999), a rejected one raises it faster and faster. Where the problem's
-/// curvature is approximate, it is kept for several steps and updated from gradients.
+/// curvature is approximate, it is kept for several steps and updated from gradients. A minimisation with a goal ends where its last steps
+/// foresee that the goal is out of reach.
 pub(crate) fn levenberg_marquardt<L: LeastSquares>(
     problem: &L,
     start: L::Point,
@@ -59,9 +60,9 @@ pub(crate) fn levenberg_marquardt<L: LeastSquares>(
     let mut damping = if approximate { settings.approximate_damping } else { settings.damping };
     let mut growth = 2.0;
     let mut status = Status::Limit;
+    let mut bounds = problem.bounds(&point);
     for number in 1..=steps {
         let done = number as f64 / steps as f64;
-        let bounds = problem.bounds(&point);
         let mut gram = current.gram.clone();
         let is_damped = |i: &usize| current.is_approximate() || !problem.is_linear(*i);
         let mut diagonal = gram.diagonal();
@@ -98,6 +99,7 @@ pub(crate) fn levenberg_marquardt<L: LeastSquares>(
             let gained = current.cost - next.cost;
             let least = settings.gain * current.cost;
             (point, current) = (trial, next);
+            bounds = problem.bounds(&point);
             history.push(current.cost);
             let ratio = gained / predicted;
             let reduction = (1.0 - (2.0 * ratio - 1.0).powi(3)).max(settings.least_reduction);
@@ -105,6 +107,9 @@ pub(crate) fn levenberg_marquardt<L: LeastSquares>(
             growth = 2.0;
             if gained < least && predicted < least {
                 status = Status::Converged;
+                break;
+            }
+            if settings.is_out_of_reach(&history, steps - number) {
                 break;
             }
         } else if current.is_old() && growth > settings.patience {

@@ -27,7 +27,11 @@ impl Problem {
     }
 
     fn minimum(&self, start: &[f64]) -> Minimum<DVector<f64>> {
-        let settings = SolverSettings { steps: 500, gain: 1e-14, ..SolverSettings::default() };
+        self.minimum_with_goal(start, 500, 0.0)
+    }
+
+    fn minimum_with_goal(&self, start: &[f64], steps: usize, goal: f64) -> Minimum<DVector<f64>> {
+        let settings = SolverSettings { steps, gain: 1e-14, goal, ..SolverSettings::default() };
         let start = DVector::from_column_slice(start);
         levenberg_marquardt(self, start, &settings, &mut |_| Ok(())).unwrap_or_else(|e| match e {})
     }
@@ -135,6 +139,22 @@ fn a_minimum_on_a_bound_is_found_and_known_as_such() {
     assert!((found.linearization.cost - 0.050_426_187_9).abs() < 1e-10);
     assert_eq!(problem.bounds(&found.point).free(), [0]);
     assert_eq!(found.status, Status::Converged);
+}
+
+/// x^2 and 1: each step halves x, and the cost x^4 + 1 comes no nearer to a half.
+#[test]
+fn a_minimisation_that_does_not_come_near_its_goal_ends() {
+    let problem = Problem::new(|x| {
+        let residuals = DVector::from_vec(vec![-x[0] * x[0], 1.0]);
+        (residuals, Matrix::from_row_slice(2, 1, &[2.0 * x[0], 0.0]))
+    });
+    let of = |goal| problem.minimum_with_goal(&[100.0], 40, goal);
+    let (all, ended) = (of(0.0), of(0.5));
+    assert_eq!([all.status, ended.status], [Status::Converged, Status::Limit]);
+    assert!(ended.history.len() < all.history.len());
+    assert_eq!(ended.history, all.history[..ended.history.len()]);
+    // one within reach changes nothing
+    assert_eq!(of(1.5).history, all.history);
 }
 
 /// Two unknowns of which the data show the sum alone: any split is as good, and none runs away.

@@ -36,6 +36,12 @@ pub(crate) struct SolverSettings {
     pub patience: f64,
     /// The part of the expected curvature that a secant update must show, Powell's 0.2.
     pub least_curvature: f64,
+    /// The cost that must be reached, zero where any is of use. A minimisation that would not reach it ends.
+    pub goal: f64,
+    /// Steps from whose gain it is foreseen whether the goal is reached.
+    pub outlook: usize,
+    /// How many times faster the logarithm of the cost may fall from then on: a fit that has found its way gains more in a step.
+    pub faster: f64,
 }
 
 impl Default for SolverSettings {
@@ -54,11 +60,23 @@ impl Default for SolverSettings {
             oldest: 12,
             patience: 8.0,
             least_curvature: 0.2,
+            goal: 0.0,
+            outlook: 4,
+            faster: 2.0,
         }
     }
 }
 
 impl SolverSettings {
+    /// Whether a goal is out of reach of the steps that are left. Over the last m steps the cost fell from `c` to `d`; in s steps it falls
+    /// to `d (d / c)^(f s / m)` at most, if its logarithm falls no more than f times faster.
+    pub(crate) fn is_out_of_reach(&self, history: &[f64], left: usize) -> bool {
+        let before = history.len().checked_sub(self.outlook + 1).map(|first| history[first]);
+        let (Some(before), Some(&now)) = (before, history.last()) else { return false };
+        let factor = (now / before).powf(self.faster * left as f64 / self.outlook as f64);
+        self.goal > 0.0 && now * factor > self.goal
+    }
+
     /// The first setting that makes no sense: its name and what it must be.
     pub(crate) fn flaw(&self) -> Option<(&'static str, &'static str)> {
         let is_fraction = |value: f64| (0.0..1.0).contains(&value);
@@ -75,6 +93,9 @@ impl SolverSettings {
             ("approximate_steps", "at least 1", self.approximate_steps >= 1),
             ("patience", "at least 1", self.patience >= 1.0),
             ("least_curvature", "at least 0 and below 1", is_fraction(self.least_curvature)),
+            ("goal", "at least 0", self.goal >= 0.0),
+            ("outlook", "at least 1", self.outlook >= 1),
+            ("faster", "at least 1", self.faster >= 1.0),
         ];
         checks.into_iter().find(|(.., holds)| !holds).map(|(name, what, _)| (name, what))
     }
@@ -96,5 +117,19 @@ mod tests {
             Some("largest_damping")
         );
         assert_eq!(name(SolverSettings { patience: 0.5, ..usual() }), Some("patience"));
+    }
+
+    #[test]
+    fn a_goal_is_out_of_reach_where_the_last_steps_foresee_it() {
+        let settings =
+            SolverSettings { goal: 1.0, outlook: 2, faster: 2.0, ..SolverSettings::default() };
+        // halved in two steps: to 100 / 16 in eight more, to less than 1 in twenty
+        let history = [1000.0, 200.0, 150.0, 100.0];
+        assert!(settings.is_out_of_reach(&history, 6));
+        assert!(!settings.is_out_of_reach(&history, 20));
+        // too few steps foresee nothing, and no goal is always reached
+        assert!(!settings.is_out_of_reach(&history[2..], 0));
+        let any = SolverSettings { goal: 0.0, ..settings };
+        assert!(!any.is_out_of_reach(&history, 0));
     }
 }

@@ -1,12 +1,11 @@
 //! What an effect adds to the output of a fitted model.
 //!
 //! All other parameters keep their fitted values: c is not what a new fit without the effect would lose, but what the
-//! effect does in this model. The model without the effect is simulated from the input stage on, because an effect may
+//! effect does in this model. The model without the effect is simulated as a whole, because an effect may
 //! act anywhere; its initial states are those of the model with it, less the states of the effect's own sections.
 
 use crate::chain::free_run::Signals;
 use crate::chain::point::Point;
-use crate::effects::Stage;
 use crate::{Error, Experiment, Matrix};
 
 /// The output with the effect less that without it, `c = y(theta) - y(theta without the effect)`, and the latter; each
@@ -18,7 +17,7 @@ pub(super) fn contribution(
     experiment: &Experiment,
     index: usize,
 ) -> Result<(Matrix, Matrix), Error> {
-    let with = point.output_from(Stage::Added, known, experiment, index)?;
-    let rest = without.output_from(Stage::Input, known, experiment, index)?;
+    let with = point.output(known);
+    let rest = without.output(&without.signals(experiment, index)?);
     Ok((with - &rest, rest))
 }

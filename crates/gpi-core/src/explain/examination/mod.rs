@@ -58,8 +58,9 @@ pub(super) fn examine(
         return Ok(Examination { refusal: None, without: None });
     };
     // what is refused may have shown the way to a better model without it
+    let goal = (1.0 - state.setup.policy.examination.better) * state.cost;
     let (without, _) = as_trial(progress, ("examination", trial.entry.name), (0, 1), |progress| {
-        fitted(state, trial.point.without_effect(place), trial.entry, progress)
+        fitted(state, trial.point.without_effect(place), trial.entry, goal, progress)
     })?;
     let cost = without.linearization.cost;
     let refusal = if let Some(refusal) = impossible(state, &trial.point, place)? {
@@ -69,7 +70,7 @@ pub(super) fn examine(
     } else {
         None
     };
-    if cost >= (1.0 - state.setup.policy.examination.better) * state.cost {
+    if cost >= goal {
         return Ok(Examination { refusal, without: None });
     }
     let held_out = state.held_out(&without.point)?;
