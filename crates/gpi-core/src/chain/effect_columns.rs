@@ -83,7 +83,8 @@ impl Point {
         install(|| self.effects.par_iter().enumerate().map(of).collect())
     }
 
-    /// The same of one effect; `here` is the output.
+    /// The same of one effect whose derivatives do not stream along, or of a curve that is a candidate; `here` is the output. Where the
+    /// effect's signal is added to the reading as it is, neither `known` nor the values of `here` are used.
     pub(crate) fn columns_of(
         &self,
         place: usize,
@@ -94,9 +95,6 @@ impl Point {
     ) -> Result<Vec<Matrix>, Error> {
         let effect = &self.effects[place];
         let Some(block) = effect.block() else { return Ok(Vec::new()) };
-        if let Place::Parallel(_) = effect.place() {
-            return Ok(Vec::new());
-        }
         let (steps, values) = (block.steps(), block.values());
         if let Place::Curves(curves) = effect.place() {
             let input = curves.input();

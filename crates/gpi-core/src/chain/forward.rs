@@ -66,12 +66,7 @@ impl<'a> Forward<'a> {
         });
         let signals = Signals::new(point, wanted);
         let drive = point.drive(experiment);
-        let stages = point.stages();
-        let added = |moves_stage| {
-            let mut added = Matrix::zeros(experiment.input.nrows(), point.dynamics.outputs());
-            stages.add(&mut stages.memories(), moves_stage, &experiment.covariates, &mut added);
-            added
-        };
+        let [displaced, added] = point.added(experiment);
         let mut is_scored = vec![false; experiment.input.nrows()];
         for run in experiment.scored_runs() {
             is_scored[run].fill(true);
@@ -84,8 +79,8 @@ impl<'a> Forward<'a> {
             sensing: Vec::new(),
             signals,
             drive,
-            displaced: added(true),
-            added: added(false),
+            displaced,
+            added,
             is_scored,
             point,
             experiment,

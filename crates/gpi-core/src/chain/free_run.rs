@@ -135,7 +135,7 @@ impl Point {
     }
 
     /// What effects add before the output stage and after it, each (samples, outputs).
-    fn added(&self, experiment: &Experiment) -> [Matrix; 2] {
+    pub(super) fn added(&self, experiment: &Experiment) -> [Matrix; 2] {
         let stages = self.stages();
         [true, false].map(|moves_stage| {
             let mut added = Matrix::zeros(experiment.input.nrows(), self.dynamics.outputs());

@@ -82,7 +82,7 @@ pub(super) fn trial(
         Some(given) => {
             let steps = state.setup.policy.fits.far_steps;
             // where the output integrates, the balance of forces decides, whatever the squares
-            let goal = if state.integrates()? { 0.0 } else { state.cost };
+            let goal = if state.integrates()? { ANY } else { state.cost };
             let options = FitOptions { steps, goal, ..state.setup.options.clone() };
             (state.fit(given, &options, entry.name, progress)?, options)
         }
