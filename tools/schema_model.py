@@ -67,6 +67,16 @@ LOOP = closed(
                 ),
                 {"const": "speed"},
                 closed({"damping": closed({"scale": size("in the unit of z")})}),
+                closed(
+                    {
+                        "excess": closed(
+                            {
+                                "limit": number("in the unit of z"),
+                                "is_lower": flag("whether z exceeds it downwards"),
+                            }
+                        )
+                    }
+                ),
             ]
         },
         "drives": {
@@ -128,6 +138,7 @@ EFFECTS: dict[str, Schema] = {
     "stiffness": closed({"loops": listed(LOOP)}),
     "hysteretic-stiffness": closed({"loops": listed(LOOP)}),
     "friction": closed({"loops": listed(LOOP)}),
+    "saturation": closed({"loops": listed(LOOP)}),
     "output-nonlinearity": closed(
         {"output": OUTPUT, "coefficients": numbers(), "middle": number(), "scale": size()}
     ),

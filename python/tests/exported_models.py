@@ -94,6 +94,20 @@ EFFECTS: dict[str, dict[str, Any]] = {
             {"sees": {"output": 0}, "law": "speed", "drives": {"input": 0, "force": -0.1, "states": 3}},
         ]
     },
+    "saturation": {
+        "loops": [
+            {
+                "sees": {"output": 0},
+                "law": {"excess": {"limit": 0.7, "is_lower": False}},
+                "drives": [-0.2, 0.05, 0.0],
+            },
+            {
+                "sees": {"mixture": {"states": [0.5, 0.2, -0.1], "inputs": [0.2]}},
+                "law": {"excess": {"limit": -0.2, "is_lower": True}},
+                "drives": [-0.1, 0.0, 0.05],
+            },
+        ]
+    },
     "output-nonlinearity": {"output": 0, "coefficients": [0.02, 0.01], "middle": 0.3, "scale": 5.0},
     "gain-drift": {"output": 0, "changes": [0.02, 0.01, -0.03], "duration": 2.0},
     "backlash": {"output": 0, "half_width": 0.05},

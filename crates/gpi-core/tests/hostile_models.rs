@@ -54,6 +54,10 @@ fn effects() -> Vec<Value> {
             {"sees": {"output": 0}, "drives": {"input": 0, "force": 0.02, "states": 1},
                 "law": {"dahl": {"distance": 0.3, "averaged": true}}},
             {"sees": {"output": 0}, "drives": [0.01], "law": "speed"}]}),
+        json!({"name": "saturation", "loops": [
+            {"sees": {"output": 0}, "drives": [-0.1], "law": {"excess": {"limit": 2.0, "is_lower": false}}},
+            {"sees": {"mixture": {"states": [0.5], "inputs": [0.1]}}, "drives": [-0.1],
+                "law": {"excess": {"limit": -1.0, "is_lower": true}}}]}),
         json!({"name": "output-nonlinearity", "output": 0, "coefficients": [0.01, 0.02], "middle": 0.0, "scale": 5.0}),
         json!({"name": "gain-drift", "output": 0, "changes": [0.01, 0.02], "duration": 10.0}),
         json!({"name": "backlash", "output": 0, "half_width": 0.1}),

@@ -114,10 +114,10 @@ def creep(own: Parameters, around: Around) -> list[Operation]:
 
 
 def stiffness(own: Parameters, around: Around) -> list[Operation]:
-    """(E7), (E16), (E17): forces that depend on the displacement or on the states, and drive the states."""
+    """(E7), (E16), (E17), (E19): forces and limits, which depend on what they see, drive the states."""
     loops = (_loop(inner, around) for inner in own["loops"])
     # stops of which there are none have no force
-    return [own for own in loops if own.kind == "power" or own.memory > 0]
+    return [own for own in loops if own.kind != "stops" or own.memory > 0]
 
 
 def _driven(drives: Any, around: Around) -> Array:
@@ -162,6 +162,10 @@ def _loop(inner: Parameters, around: Around) -> Operation:
     if "damping" in inner["law"]:
         numbers = {"scale": inner["law"]["damping"]["scale"], "pace": float(around.substeps)}
         return Operation("damping", "loops", output, numbers, memory=1, seen=seen, drives=drives)
+    if "excess" in inner["law"]:
+        law = inner["law"]["excess"]
+        numbers = {"limit": law["limit"], "is_lower": int(law["is_lower"])}
+        return Operation("excess", "loops", output, numbers, seen=seen, drives=drives)
     law = inner["law"]["stops"]
     arrays = {key: np.array(law[key]) for key in ("half_widths", "weights")}
     count = len(law["weights"])
@@ -245,6 +249,7 @@ EXPORTED: dict[str, Callable[[Parameters, Around], list[Operation]]] = {
     "stiffness": stiffness,
     "hysteretic-stiffness": stiffness,
     "friction": stiffness,
+    "saturation": stiffness,
     "output-nonlinearity": output_nonlinearity,
     "gain-drift": gain_drift,
     "backlash": backlash,

@@ -13,7 +13,7 @@
 //! | d_oi | y_o | v_i | 1 |
 //! | a_j, b_ji, c_oj, d_oi, and E_j, S_j, T_i or the force of a loop | z and x_j, in each step | x_j, v_i, w | see `around_loops` |
 //! | ln r of a stop | half-width | 1 | r |
-//! | beta, gamma, n of Bouc and Wen's force | itself | 1 | 1 |
+//! | beta, gamma, n of Bouc and Wen's force, a limit | itself | 1 | 1 |
 //! | ln d of Dahl's friction, ln of the scale of a damping | itself | 1 | itself |
 //! | weight of a stop | w | z - F, the stop | 1 |
 //!
@@ -312,7 +312,7 @@ impl Entries<'_> {
             // by their logarithms
             Law::Dahl { distance: scale, .. } | Law::Damping { scale } => vec![*scale],
             Law::Stops { half_widths, .. } => half_widths.clone(),
-            Law::BoucWen { .. } => vec![1.0; shapes.len()],
+            Law::BoucWen { .. } | Law::Excess { .. } => vec![1.0; shapes.len()],
         };
         let mut unknown = first;
         for (place, factor) in shapes.zip(factors) {

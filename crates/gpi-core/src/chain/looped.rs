@@ -1,7 +1,7 @@
 //! A plant with every kind of thing in the loops around G and behind them, for tests.
 //!
-//! Two inputs and two outputs, three states, six loops: one sum of stops that sees a mixture of states and inputs, a
-//! cubic power, a force of Bouc and Wen, Dahl's friction, a speed and a damping that see an output each, a backlash and a polynomial behind one output. The gains of
+//! Two inputs and two outputs, three states, eight loops: one sum of stops that sees a mixture of states and inputs, a
+//! cubic power, a force of Bouc and Wen, Dahl's friction, a speed, a damping and two limits that see an output each, a backlash and a polynomial behind one output. The gains of
 //! the loops are small enough that the plant stays in motion and that plays and stops both stick and slide within a
 //! run.
 
@@ -46,6 +46,16 @@ fn stiffness() -> Stiffness {
                 sees: Sees::Output(0),
                 law: Law::Damping { scale: 0.3 },
                 drives: drives(0.04),
+            },
+            InnerLoop {
+                sees: Sees::Output(0),
+                law: Law::Excess { limit: 0.6, is_lower: false },
+                drives: drives(-0.1),
+            },
+            InnerLoop {
+                sees: Sees::Output(1),
+                law: Law::Excess { limit: -0.4, is_lower: true },
+                drives: drives(-0.1),
             },
         ],
     }

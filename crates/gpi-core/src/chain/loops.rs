@@ -24,7 +24,8 @@
 //! `z - F_i` itself, and is injected at w (see `injections`).
 //!
 //! The forces of Bouc and Wen and of Dahl remember the force and the last two z, and depend on the path of z alone; their steps and the
-//! derivatives of them, which are the marks, are in [`super::bouc_wen`] and [`super::dahl`]. The speed `|z - z_1|` has the sign of
+//! derivatives of them, which are the marks, are in [`super::bouc_wen`] and [`super::dahl`]. The mark of an excess is 1 while z exceeds its
+//! limit, and 0 elsewhere: `dw = m (dz - d limit)`. The speed `|z - z_1|` has the sign of
 //! `z - z_1` as its mark, and damping its derivatives by that change and by its scale. What depends on the speed counts the change in a
 //! sample: that of a step times the number of steps. No loop is algebraic: w of one step changes z from the next step on ([`super::between`]).
 
@@ -168,6 +169,12 @@ impl Law {
                 marks.copy_from_slice(&[pace * slope, part - change * slope]);
                 scale * part
             }
+            &Self::Excess { limit, is_lower } => {
+                let beyond = z - limit;
+                let exceeds = if is_lower { beyond < 0.0 } else { beyond > 0.0 };
+                marks[0] = f64::from(u8::from(exceeds));
+                if exceeds { beyond } else { 0.0 }
+            }
         }
     }
 
@@ -227,6 +234,10 @@ impl Law {
                 add(simd, &mut w, marks[1], &shape[0]);
                 places[0] = z;
             }
+            Self::Excess { .. } => {
+                add(simd, &mut w, marks[0], &z);
+                add(simd, &mut w, -marks[0], &shape[0]);
+            }
         }
         w
     }
@@ -243,6 +254,10 @@ impl Law {
         let mut z = 0.0;
         match self {
             Self::Power { .. } => z += marks[0] * w,
+            Self::Excess { .. } => {
+                z += marks[0] * w;
+                shape[0] -= marks[0] * w;
+            }
             Self::Stops { weights, .. } => {
                 let stops = weights.iter().zip(shape).zip(marks).zip(places);
                 for (((weight, half_width), &mark), place) in stops {

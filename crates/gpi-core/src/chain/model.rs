@@ -131,7 +131,8 @@ impl Model {
             let over_stiffness = inner.relative_force(&b, gains)?;
             let sensitivity = self.linear().dc_gain().ok()?[(0, 0)]
                 * Parameters::from_operator(&self.hysteresis()[0]).slope();
-            Some(SteadyForce::new(over_stiffness, sensitivity, &poles, self.rate()))
+            let offset = self.offsets()[0];
+            Some(SteadyForce::new(over_stiffness, sensitivity, &poles, self.rate(), offset))
         };
         let gain =
             self.linear().dc_gain().map_or(f64::NAN, |gain| gain[(place.output().unwrap_or(0), 0)]);

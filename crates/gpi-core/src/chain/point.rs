@@ -190,6 +190,15 @@ impl Point {
         })
     }
 
+    /// Lets loops take no more than the whole excess over a limit away in a step. What exceeds it would otherwise be thrown back, and the
+    /// derivatives of such a motion grow from step to step.
+    pub(crate) fn bound_limits(&mut self) {
+        let (c, steps) = (self.dynamics.c(), self.intersample.substeps as f64);
+        for inner in self.loops_mut().filter(|inner| inner.law.limits()) {
+            inner.take_at_most(steps, &c);
+        }
+    }
+
     /// The loops that effects close around G, to be changed.
     pub(crate) fn loops_mut(&mut self) -> impl Iterator<Item = &mut InnerLoop> {
         let loops = self.effects.iter_mut().filter_map(|effect| match effect.place_mut() {
@@ -225,7 +234,10 @@ impl Point {
         let gains = |drives: &[f64]| Some(self.dynamics.gains_from_states(drives));
         let over_stiffness = inner.relative_force(&b, gains)?;
         let sensitivity = self.dynamics.dc_gain()[(0, 0)] * self.channels[0].slope();
-        Some(SteadyForce::new(over_stiffness, sensitivity, &self.dynamics.poles(), self.rate))
+        let offset =
+            self.offsets.iter().map(|own| own[(0, 0)]).sum::<f64>() / self.offsets.len() as f64;
+        let poles = self.dynamics.poles();
+        Some(SteadyForce::new(over_stiffness, sensitivity, &poles, self.rate, offset))
     }
 
     /// What the output of the hysteresis is, by its elements.

@@ -332,6 +332,7 @@ impl Point {
         if table.rows().any(|(group, _)| group.is_dynamics()) {
             moved.dynamics.hold_gain();
         }
+        moved.bound_limits();
         moved
     }
 }

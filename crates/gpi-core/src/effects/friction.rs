@@ -69,7 +69,7 @@ impl ClosedLoops for Friction {
         &self.loops
     }
 
-    fn loops_mut(&mut self) -> &mut [InnerLoop] {
+    fn loops_mut(&mut self) -> &mut Vec<InnerLoop> {
         &mut self.loops
     }
 }

@@ -59,7 +59,7 @@ impl ClosedLoops for HystereticStiffness {
         &self.loops
     }
 
-    fn loops_mut(&mut self) -> &mut [InnerLoop] {
+    fn loops_mut(&mut self) -> &mut Vec<InnerLoop> {
         &mut self.loops
     }
 }

@@ -118,6 +118,14 @@ pub enum Law {
         /// The change of z in a sample at which the force is near its limit, in the unit of z, positive.
         scale: f64,
     },
+    /// `w = max(z - limit, 0)`, or `w = min(z - limit, 0)` of a lower limit: by how much z exceeds a limit. A loop that takes w away from
+    /// what moves z keeps it at the limit, as an end stop or the rim of a tank does.
+    Excess {
+        /// In the unit of z.
+        limit: f64,
+        /// Whether z exceeds it downwards.
+        is_lower: bool,
+    },
 }
 
 impl Law {
@@ -125,7 +133,7 @@ impl Law {
     /// path of z; the last z where it depends on the speed.
     pub(crate) fn memories(&self) -> usize {
         match self {
-            Self::Power { .. } => 0,
+            Self::Power { .. } | Self::Excess { .. } => 0,
             Self::Stops { half_widths, .. } => half_widths.len(),
             Self::BoucWen { .. } | Self::Dahl { .. } => 3,
             Self::Speed | Self::Damping { .. } => 1,
@@ -133,19 +141,24 @@ impl Law {
     }
 
     /// The number of values to which w does not respond linearly: the half-widths of stops; beta, gamma and the exponent; the
-    /// break-away distance; the scale of a damping.
+    /// break-away distance; the scale of a damping; a limit.
     pub(crate) fn shapes(&self) -> usize {
         match self {
             Self::Power { .. } | Self::Speed => 0,
             Self::Stops { half_widths, .. } => half_widths.len(),
             Self::BoucWen { .. } => 3,
-            Self::Dahl { .. } | Self::Damping { .. } => 1,
+            Self::Dahl { .. } | Self::Damping { .. } | Self::Excess { .. } => 1,
         }
     }
 
     /// Whether it dissipates energy by a force that must oppose the displacement.
     pub(crate) fn is_dissipative(&self) -> bool {
         matches!(self, Self::BoucWen { .. } | Self::Dahl { .. })
+    }
+
+    /// Whether it is a limit of what it sees.
+    pub(crate) fn limits(&self) -> bool {
+        matches!(self, Self::Excess { .. })
     }
 
     /// The number of weights of a sum.
@@ -156,7 +169,7 @@ impl Law {
     /// The number of marks that a step leaves for derivatives.
     pub(crate) fn marks(&self) -> usize {
         match self {
-            Self::Power { .. } | Self::Speed => 1,
+            Self::Power { .. } | Self::Speed | Self::Excess { .. } => 1,
             Self::Damping { .. } => 2,
             Self::Stops { half_widths, .. } => half_widths.len().max(1),
             Self::BoucWen { .. } => 4 + self.shapes(),
@@ -218,6 +231,20 @@ impl InnerLoop {
         }
         if let Sees::Mixture { states: own, .. } = &mut self.sees {
             own.drain(states);
+        }
+    }
+
+    /// Shortens its column of E so that a unit of w takes no more than `most` away from z: `-S E <= most`, S the row of what it sees, or that
+    /// of C.
+    pub(crate) fn take_at_most(&mut self, most: f64, c: &crate::Matrix) {
+        let Drives::States(column) = &mut self.drives else { return };
+        let seen = |state: usize| match &self.sees {
+            Sees::Output(output) => c[(*output, state)],
+            Sees::Mixture { states, .. } => states[state],
+        };
+        let taken = -column.iter().enumerate().map(|(j, drive)| drive * seen(j)).sum::<f64>();
+        if taken > most {
+            column.iter_mut().for_each(|drive| *drive *= most / taken);
         }
     }
 
@@ -291,6 +318,9 @@ impl InnerLoop {
             }
             Law::Damping { scale } if scale.is_nan() || *scale <= 0.0 => {
                 Some(format!("has the scale {scale} of its damping, but it must be positive"))
+            }
+            Law::Excess { limit, .. } if !limit.is_finite() => {
+                Some(format!("has the limit {limit}, but it must be finite"))
             }
             Law::BoucWen { exponent, .. } if exponent.is_nan() || *exponent < 1.0 => {
                 Some(format!("has the exponent {exponent}, but it must be at least 1"))

@@ -1,7 +1,7 @@
 //! The values of loops around G: what is estimated, in which limits, and what it is called.
 //!
 //! The values of a loop are its column of E, its rows of S and T, and those of its law: the logarithms of the half-widths
-//! of stops and their weights, beta, gamma and the exponent, or the logarithm of a break-away distance or of the scale of a damping. The product of E, the scale of the signal and the scale of w is what the
+//! of stops and their weights, beta, gamma and the exponent, the logarithm of a break-away distance or of the scale of a damping, or a limit. The product of E, the scale of the signal and the scale of w is what the
 //! output shows; therefore the largest element of S and T, or the widest half-width and the last weight of stops, are held.
 
 use super::{Block, ClosedLoops, Drives, InnerLoop, Law, Quantity, Sees, SteadyForce, Units};
@@ -56,6 +56,7 @@ fn groups(inner: &mut InnerLoop) -> Vec<Group<'_>> {
         Law::Dahl { distance: scale, .. } | Law::Damping { scale } => {
             groups.push(Group::Logarithms(std::slice::from_mut(scale)));
         }
+        Law::Excess { limit, .. } => groups.push(Group::Plain(std::slice::from_mut(limit))),
         Law::Stops { half_widths, weights } => {
             groups.extend([Group::Logarithms(half_widths), Group::Plain(weights)]);
         }
@@ -107,10 +108,15 @@ fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
         }));
         if let Sees::Mixture { states, inputs } = &inner.sees {
             let seen = || states.iter().chain(inputs);
-            bounds.extend(free(states.len() + inputs.len()));
+            if inner.law.limits() {
+                // what a pole of G holds, and nothing else
+                bounds.extend(seen().map(|value| (*value, *value)));
+            } else {
+                bounds.extend(free(states.len() + inputs.len()));
+            }
             let largest =
                 seen().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-            let is_held = !matches!(&inner.law, Law::Stops { .. });
+            let is_held = !matches!(&inner.law, Law::Stops { .. } | Law::Excess { .. });
             // the scale of z is in the drives as well, and in beta and gamma
             if let Some((place, value)) = largest.filter(|_| is_held) {
                 let first = bounds.len() - seen().count();
@@ -129,6 +135,9 @@ fn bounds(loops: &[InnerLoop]) -> Vec<(f64, f64)> {
             /// scale of a damping.
             const STEP: f64 = 0.5;
             bounds.push((scale.ln() - STEP, scale.ln() + STEP));
+        }
+        if inner.law.limits() {
+            bounds.extend(free(1));
         }
         if let Law::Stops { half_widths, weights } = &inner.law {
             /// Largest distance of a half-width from the widest one, in logarithms: a factor of a thousand.
@@ -184,6 +193,12 @@ fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
         if let Law::Damping { scale } = &inner.law {
             found.push(Quantity::new(format!("damping_scale[{q}]"), units.output, *scale));
         }
+        if let Law::Excess { limit, .. } = &inner.law {
+            // that of an output is printed as what the output shows
+            if !matches!(inner.sees, Sees::Output(_)) {
+                found.push(Quantity::new(format!("limit[{q}]"), "", *limit));
+            }
+        }
         if let Law::BoucWen { beta, gamma, exponent } = &inner.law {
             // z is a displacement
             let unit = match units.output {
@@ -203,6 +218,8 @@ fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
 /// A power n of the displacement z adds `k_n z^n` to the linear force `k_1 z`; `kn_over_k1` is their ratio. The force of Bouc
 /// and Wen is `k_h w` with `w = z` for small motion; `hysteretic_over_linear` is `k_h / k_1`.
 ///
+/// A limit of the displacement is printed as the output at it.
+///
 /// Friction is printed as the part of the input that it takes away, together with the mass, damping and stiffness of the mechanics.
 pub(super) fn in_steady_state(
     loops: &[InnerLoop],
@@ -210,7 +227,8 @@ pub(super) fn in_steady_state(
     forces: &dyn Fn(&InnerLoop) -> Option<SteadyForce>,
 ) -> Vec<Quantity> {
     let of = |(q, inner): (usize, &InnerLoop)| {
-        let SteadyForce { over_stiffness: force, of_input, period, mechanics } = forces(inner)?;
+        let steady = forces(inner)?;
+        let SteadyForce { over_stiffness: force, of_input, period, mechanics, offset } = steady;
         let (name, unit, value) = match &inner.law {
             Law::Power { exponent, scale } => {
                 let unit = match (units.output, exponent - 1) {
@@ -232,6 +250,10 @@ pub(super) fn in_steady_state(
                 let [_, damping, stiffness] = mechanics?;
                 let name = "nonlinear_over_linear_damping".to_owned();
                 (name, String::new(), force * period * stiffness / damping)
+            }
+            Law::Excess { limit, .. } => {
+                let name = format!("limit[{q}]");
+                return Some(Quantity::new(name, units.output, offset + limit));
             }
             // |dz| is the speed times the period
             Law::Speed => {

@@ -114,6 +114,7 @@ catalogue! {
     stiffness::Stiffness: Loops,
     hysteretic_stiffness::HystereticStiffness: Loops,
     friction::Friction: Loops,
+    saturation::Saturation: Loops,
     output_nonlinearity::OutputNonlinearity: Output,
     gain_drift::GainDrift: Output,
     backlash::Backlash: Output,
@@ -213,6 +214,12 @@ impl Effect {
         }
     }
 
+    /// Whether it is a limit of what moves inside the dynamics, and no force.
+    pub(crate) fn limits(&self) -> bool {
+        let closed = self.place().closed_loops();
+        closed.is_some_and(|closed| closed.loops().iter().all(|inner| inner.law.limits()))
+    }
+
     /// The same slow function of time through every second of its knots, if it has fewer.
     pub(crate) fn coarser(&self) -> Option<Self> {
         let mut coarser = self.clone();
@@ -284,8 +291,8 @@ mod tests {
     use crate::linear::{Section, Sections};
     use crate::{Channel, Experiment, Matrix, Record};
 
-    /// Calls `ask` with a situation in which every effect but the findings has proposals.
-    fn situation(ask: impl FnOnce(&Situation)) {
+    /// Calls `ask` with a situation around a section of this denominator.
+    fn situation(denominator: [f64; 2], ask: impl FnOnce(&Situation)) {
         let signal = |f: fn(f64) -> f64| Matrix::from_fn(1000, 1, |k, _| f(k as f64));
         let (input, covariates) = (signal(|k| (0.01 * k * k).sin()), signal(|k| (0.03 * k).cos()));
         let run =
@@ -295,7 +302,7 @@ mod tests {
         let record =
             Record::new(vec![run], 100.0, channel("u"), channel("y"), channel("x")).unwrap();
         let (b, c) = (Matrix::from_element(2, 1, 0.1), Matrix::from_row_slice(1, 2, &[1.0, 0.0]));
-        let mode = Section { a: vec![-1.2, 0.6], b, c, reference: 0, growth: 1.0 };
+        let mode = Section { a: denominator.to_vec(), b, c, reference: 0, growth: 1.0 };
         ask(&Situation {
             record: &record,
             drives: &signals,
@@ -316,11 +323,11 @@ mod tests {
             assert_eq!((effect.name(), effect.stage()), (entry.name, entry.stage));
             assert_eq!(serde_json::to_value(effect).unwrap()["name"], entry.name);
         };
-        situation(|situation| {
+        let mut proposed = std::collections::BTreeSet::new();
+        let mut check = |situation: &Situation| {
             for entry in CATALOGUE {
-                let found = (entry.proposals)(situation);
-                assert_eq!(found.is_empty(), entry.stage == Stage::Noise, "{}", entry.name);
-                for proposal in found {
+                for proposal in (entry.proposals)(situation) {
+                    proposed.insert(entry.name);
                     agrees(&proposal.block, entry);
                     if let Some(moved) = proposal.block.elsewhere() {
                         assert_eq!(moved.stage(), Stage::Displaced);
@@ -328,7 +335,18 @@ mod tests {
                     }
                 }
             }
-        });
+        };
+        // a resonance, and two real poles
+        situation([-1.2, 0.6], &mut check);
+        situation([-1.7, 0.72], &mut check);
+        for entry in CATALOGUE {
+            assert_eq!(
+                proposed.contains(entry.name),
+                entry.stage != Stage::Noise,
+                "{}",
+                entry.name
+            );
+        }
         let (coefficients, innovation, deviation) = (vec![0.5], 1.0, 1.2);
         let findings: [Effect; 2] = [
             Outliers { count: 1, samples: 10, size: 1.0 }.into(),

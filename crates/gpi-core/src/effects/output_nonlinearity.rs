@@ -29,7 +29,6 @@ impl OutputNonlinearity {
         "sensor curve",
         "sensor nonlinearity",
         "sensor-nonlinearity",
-        "saturation",
         "nonlinearity",
         "static curve",
     ];

@@ -13,23 +13,26 @@ pub struct SteadyForce {
     pub period: f64,
     /// Mass, damping and stiffness of a G of two poles, in the unit of the input over that of the output and its derivatives in seconds.
     pub mechanics: Option<[f64; 3]>,
+    /// What is added to the displacement to make the output, in the unit of the output.
+    pub offset: f64,
 }
 
 impl SteadyForce {
     /// Of a loop whose force over the stiffness is known, at a rate in Hz, around a G with these poles that changes the output by
-    /// `sensitivity` per unit of the input.
+    /// `sensitivity` per unit of the input, and to which `offset` is added.
     pub(crate) fn new(
         over_stiffness: f64,
         sensitivity: f64,
         poles: &[Complex64],
         rate: f64,
+        offset: f64,
     ) -> Self {
         let mechanics = match *poles {
             [p, q] => Some(mechanics([p, q], sensitivity, rate)),
             _ => None,
         };
         let of_input = over_stiffness / sensitivity;
-        Self { over_stiffness, of_input, period: rate.recip(), mechanics }
+        Self { over_stiffness, of_input, period: rate.recip(), mechanics, offset }
     }
 }
 
@@ -50,11 +53,11 @@ mod tests {
         // 0.5 y'' + 0.2 y' + 8 y = u at 100 Hz
         let root = Complex64::new(0.04 - 16.0, 0.0).sqrt();
         let poles = [root, -root].map(|root| ((root - 0.2) * 0.01).exp());
-        let found = SteadyForce::new(0.3, 0.125, &poles, 100.0);
+        let found = SteadyForce::new(0.3, 0.125, &poles, 100.0, 0.0);
         assert!((found.of_input - 2.4).abs() < 1e-12);
         for (found, wanted) in found.mechanics.unwrap().iter().zip([0.5, 0.2, 8.0]) {
             assert!((found - wanted).abs() < 1e-9, "{found} {wanted}");
         }
-        assert_eq!(SteadyForce::new(0.3, 0.125, &poles[..1], 100.0).mechanics, None);
+        assert_eq!(SteadyForce::new(0.3, 0.125, &poles[..1], 100.0, 0.0).mechanics, None);
     }
 }

@@ -141,7 +141,7 @@ impl ClosedLoops for Stiffness {
         &self.loops
     }
 
-    fn loops_mut(&mut self) -> &mut [InnerLoop] {
+    fn loops_mut(&mut self) -> &mut Vec<InnerLoop> {
         &mut self.loops
     }
 }

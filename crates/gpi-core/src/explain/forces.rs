@@ -6,15 +6,21 @@
 //! begins there, without plays and deadzones.
 
 use super::force_balance::{Balance, balance, squares};
+use super::limits::limited;
 use super::ranking::Ranked;
 use super::score::Score;
 use super::state::{SearchState, Trial};
 use crate::chain::point::{DynamicsFreedom, Point};
-use crate::effects::{Drives, Effect, Entry, OutputKind, PlaceMut, Proposal, Situation, Stage};
+use crate::effects::{
+    Drives, Effect, Entry, InnerLoop, OutputKind, PlaceMut, Proposal, Situation, Stage,
+};
 use crate::fit::preparation::rescale;
 use crate::linear::Sections;
 use crate::progress::Progress;
 use crate::{Error, Experiment, Matrix};
+
+/// States of a mass.
+const MECHANICS: usize = 2;
 
 /// The best force of each effect that acts inside the mechanics, with the model to begin at. None where the model has such a force, or the
 /// part of the squares that another effect promises brings it near the noise, or where the input repeats one cycle, whose shape any force
@@ -37,7 +43,9 @@ pub(super) fn forces(
     let is_free = moving.half_widths && moving.thresholds && !state.setup.order_is_given;
     let left = (1.0 - promised) * state.cost;
     let is_near = left <= policy.judgement.near_noise * state.noise_squares()?;
-    let is_pointless = state.setup.is_one_sine || state.point.loops().next().is_some();
+    let is_in_the_way =
+        |inner: &InnerLoop| !inner.law.limits() || inner.drives.states() != MECHANICS;
+    let is_pointless = state.setup.is_one_sine || state.point.loops().any(is_in_the_way);
     if !is_single || !is_free || is_near || is_pointless {
         return Ok(Vec::new());
     }
@@ -53,11 +61,22 @@ pub(super) fn forces(
         if is_refused || state.out_of_reach.contains(entry.name) {
             continue;
         }
-        let Some((own, mut effect)) = best(state, &linear, entry) else { continue };
+        let proposals = proposals(state, &linear, entry);
+        let is_limit = |one: &Proposal<Effect>| one.block.limits();
+        if proposals.iter().any(is_limit) {
+            // more limits of a model that has some are tried by the score test
+            if state.has(entry) {
+                continue;
+            }
+            let point = begin(state, &straight, linear.clone(), None);
+            found.extend(limited(state, point, entry, progress)?);
+            continue;
+        }
+        let Some((own, mut effect)) = best(state, &linear, proposals) else { continue };
         let Some(dynamics) = dynamics(&own) else { continue };
         let forces: Vec<f64> = own.forces.iter().map(|force| gain * force).collect();
         set_forces(&mut effect, &forces, &dynamics);
-        let point = begin(state, &straight, dynamics, effect.clone());
+        let point = begin(state, &straight, dynamics, Some(effect.clone()));
         let start = Some(settled(state, point, entry, progress)?);
         let (columns, gain) = (forces.len(), own.explained);
         let score = Score { start: effect, zero: None, gain, columns };
@@ -108,7 +127,11 @@ pub(super) fn balanced(state: &SearchState, trial: &Trial) -> Result<Option<Bala
 }
 
 /// The balance with the block of an effect whose forces explain most, if that is enough, and the block.
-fn best(state: &SearchState, linear: &Sections, entry: &Entry) -> Option<(Balance, Effect)> {
+fn best(
+    state: &SearchState,
+    linear: &Sections,
+    proposals: Vec<Proposal<Effect>>,
+) -> Option<(Balance, Effect)> {
     let (record, policy) = (&state.prepared.record, &state.setup.policy.balance);
     let of = |proposal: Proposal<Effect>| {
         let loops = proposal.block.place().closed_loops()?.loops();
@@ -117,7 +140,7 @@ fn best(state: &SearchState, linear: &Sections, entry: &Entry) -> Option<(Balanc
     let better = |known: (Balance, Effect), next: (Balance, Effect)| {
         if next.0.explained > known.0.explained { next } else { known }
     };
-    let found = proposals(state, linear, entry).into_iter().filter_map(of).reduce(better);
+    let found = proposals.into_iter().filter_map(of).reduce(better);
     found.filter(|(own, _)| own.explained >= policy.least)
 }
 
@@ -132,19 +155,24 @@ fn set_forces(effect: &mut Effect, forces: &[f64], dynamics: &Sections) {
     }
 }
 
-/// The present model with other dynamics and one more effect, and without plays and deadzones.
-fn begin(state: &SearchState, straight: &Point, dynamics: Sections, effect: Effect) -> Point {
+/// The present model with other dynamics and one more effect, if there is one, and without plays and deadzones.
+fn begin(
+    state: &SearchState,
+    straight: &Point,
+    dynamics: Sections,
+    effect: Option<Effect>,
+) -> Point {
     let mut point = state.prepared.point(dynamics);
     point.channels.clone_from(&straight.channels);
     state.prepared.settle(&mut point);
-    let effects = state.point.effects.iter().cloned().chain([effect]);
+    let effects = state.point.effects.iter().cloned().chain(effect);
     let mut point = effects.fold(point, |point, effect| point.with_effect(effect));
     rescale(&mut point);
     point
 }
 
 /// A point with the offsets and initial states that fit best, all else held.
-fn settled(
+pub(super) fn settled(
     state: &SearchState,
     point: Point,
     entry: &Entry,

@@ -12,7 +12,8 @@
 //!    Autocorrelated residuals are worth fewer samples than they have: with a factor kappa, by which the covariance
 //!    of the parameters exceeds that for white noise, the first two terms count kappa times.
 //! 3. *Confirmed*: the squares of the held-out blocks fall, see [`is_confirmed`], and by nearly as large a part as those of
-//!    the training data.
+//!    the training data. A model with fewer unknowns than the present one adds nothing that chance could use: of it, the fall of
+//!    the sum is enough, if it is substantial.
 //! 4. *Substantial*: far from the noise a bad fit resembles many effects a little, so a large part of the training
 //!    and of the held-out squares must go. This is not asked near the noise, of an effect whose signature no bad fit
 //!    has, or of more of a driven effect that the model has already.
@@ -83,6 +84,8 @@ pub(super) struct Evidence<'a> {
     pub held_out: [&'a [f64]; 2],
     /// Whether the input makes it explain what it does, where it is an effect that the input drives.
     pub is_driven: bool,
+    /// Whether the model with it has fewer unknowns than the present one.
+    pub is_simpler: bool,
     /// Whether no bad fit has its signature.
     pub is_unique: bool,
     /// Whether the model has this driven effect already.
@@ -132,6 +135,8 @@ pub(super) enum Refusal {
     AsFastAsLags,
     /// It is a function of time that leaves much of an error that is far above the noise.
     FollowsTheRest,
+    /// It is a limit that shows where the output stands at its limits only.
+    ClipsOnly,
     /// It is a spring inside a mechanical loop, and the dynamics have no resonance.
     NoResonance,
     /// The model without it, fitted from where the trial ended, explains as much.
@@ -179,6 +184,9 @@ impl Refusal {
             Self::FollowsTheRest => {
                 "is a function of time that may follow what the model lacks: the error of the model would still be far above the noise".to_owned()
             }
+            Self::ClipsOnly => {
+                "explains no more than a sensor that clips: only the samples at which the output stands at its limits".to_owned()
+            }
             Self::NoResonance => "would act inside a mechanical loop, and the dynamics have no resonance".to_owned(),
             Self::LongerFit => "reduces the error no more than a longer fit of the model without it".to_owned(),
             Self::Confounded => format!("explains as much as {taken}"),
@@ -195,7 +203,9 @@ pub(super) fn judge(trial: &Evidence, policy: &JudgementPolicy) -> Result<(), Re
         Err(Refusal::Undriven)
     } else if trial.deviance <= trial.threshold {
         Err(Refusal::Insignificant)
-    } else if !is_confirmed(trial.held_out, policy) || !is_seen(trial, policy) {
+    } else if !(is_confirmed(trial.held_out, policy) || is_better_and_simpler(trial, policy))
+        || !is_seen(trial, policy)
+    {
         Err(Refusal::Unconfirmed)
     } else if !is_weighty(trial, policy) {
         Err(Refusal::Insubstantial)
@@ -258,15 +268,24 @@ fn is_seen(trial: &Evidence, policy: &JudgementPolicy) -> bool {
     part(held_out) >= policy.seen * part(trial.squares)
 }
 
+/// Whether the model of a trial has fewer unknowns, and substantially smaller squares of both kinds.
+fn is_better_and_simpler(trial: &Evidence, policy: &JudgementPolicy) -> bool {
+    trial.is_simpler && is_substantial(trial, policy)
+}
+
+/// Whether a large part of the training squares and of the held-out squares is gone.
+fn is_substantial(trial: &Evidence, policy: &JudgementPolicy) -> bool {
+    let takes = |part: f64, [before, after]: [f64; 2]| after < (1.0 - part) * before;
+    takes(policy.substantial, trial.squares)
+        && takes(policy.substantial_held_out, trial.held_out.map(|blocks| blocks.iter().sum()))
+}
+
 /// Whether a trial is substantial, or need not be.
 fn is_weighty(trial: &Evidence, policy: &JudgementPolicy) -> bool {
-    let takes = |part: f64, [before, after]: [f64; 2]| after < (1.0 - part) * before;
-    let is_substantial = takes(policy.substantial, trial.squares)
-        && takes(policy.substantial_held_out, trial.held_out.map(|blocks| blocks.iter().sum()));
     let [before, after] = trial.squares;
     let is_near_noise = after < policy.near_noise * trial.noise
         && before - after > policy.beyond_rest * (after - trial.noise);
-    is_substantial || is_near_noise || trial.is_unique || trial.is_more
+    is_substantial(trial, policy) || is_near_noise || trial.is_unique || trial.is_more
 }
 
 /// Whether the held-out squares, block by block without and with an effect, have fallen significantly.
@@ -322,6 +341,7 @@ mod tests {
             noise: 1.0,
             held_out: [&BEFORE, &AFTER],
             is_driven: true,
+            is_simpler: false,
             is_unique: false,
             is_more: false,
             is_plausible: true,
@@ -345,6 +365,16 @@ mod tests {
         assert_eq!(judged(|trial| trial.deviance = 40.0), Err(Refusal::Insignificant));
         let unconfirmed = judged(|trial| trial.held_out = [&BEFORE, &BEFORE]);
         assert_eq!(unconfirmed, Err(Refusal::Unconfirmed));
+        // unsure by block, which fewer unknowns make up for
+        let unsure = |is_simpler, after: &'static [f64]| {
+            judged(|trial| {
+                (trial.held_out, trial.is_simpler) = ([&BEFORE, after], is_simpler);
+            })
+        };
+        const UNEVEN: [f64; 4] = [1.0, 14.0, 4.0, 8.0];
+        assert_eq!(unsure(false, &UNEVEN), Err(Refusal::Unconfirmed));
+        assert_eq!(unsure(true, &UNEVEN), Ok(()));
+        assert_eq!(unsure(true, &[1.0, 17.0, 9.0, 8.0]), Err(Refusal::Unconfirmed));
         assert_eq!(judged(|trial| trial.squares[1] = 71.0), Err(Refusal::Insubstantial));
         let little = judged(|trial| trial.held_out = [&BEFORE, &[8.1, 9.0, 7.3, 8.1]]);
         assert_eq!(little, Err(Refusal::Insubstantial));

@@ -30,6 +30,7 @@ mod force_balance;
 mod forces;
 mod grid;
 mod judgement;
+mod limits;
 mod moved_resonance;
 mod noise;
 mod outside;

@@ -21,6 +21,8 @@ pub(crate) struct SearchPolicy {
     pub steps: StepsPolicy,
     /// Which forces inside the mechanics are fitted too.
     pub balance: BalancePolicy,
+    /// Fits that begin at limits of states.
+    pub limits: LimitPolicy,
     /// Which of them are accepted.
     pub judgement: JudgementPolicy,
     /// Whether the accepted trial has earned its name.
@@ -46,6 +48,7 @@ impl SearchPolicy {
         self.fits.validate()?;
         self.steps.validate()?;
         self.balance.validate()?;
+        self.limits.validate()?;
         self.judgement.validate()?;
         self.examination.validate()?;
         self.revision.validate()?;
@@ -167,6 +170,16 @@ settings! {
         coarser: f64 = 10.0, FROM_ONE;
     }
 
+    /// Fits that begin at limits of states, see [`limits`](super::limits).
+    struct LimitPolicy {
+        /// Fits with a limit of one state that are continued with what the poles hold that they have moved to: several begin near the
+        /// best one. By hand.
+        retied: usize = 3, FROM_ONE;
+        /// Such continuations at most, and the part of the squares below which one is the last. By hand.
+        ties: usize = 8, FROM_ONE;
+        worth: f64 = 1e-3, PART;
+    }
+
     /// What the balance of forces must show, see [`force_balance`](super::force_balance).
     struct BalancePolicy {
         /// The first poles of the filter, over the rms change of the output from sample to sample relative to its standard
@@ -261,6 +274,9 @@ settings! {
         left_at_most: f64 = 0.5, PART;
         /// The same of a slow function of time: it must be three times what is left, because it can follow any slow error. By hand.
         left_by_slow: f64 = 0.1, PART;
+        /// Part of the excess over a limit that a limit may leave in steady state. By hand: water rises above a rim, too, but most of it
+        /// runs off. What leaves more is a kink of a restoring force.
+        excess: f64 = 1.0 / 3.0, PART;
         /// Part by which the squares must fall for the model without a refused effect to be taken instead of the present one:
         /// that of a finer grid that goes on.
         better: f64 = 0.02, PART;

@@ -131,17 +131,20 @@ impl Sections {
         self.sections.iter().fold(self.d.clone(), |sum, s| sum + &s.c * s.steady(&s.b))
     }
 
+    /// `(I - A)^-1 E`, (order): the states in steady state where E is added to each next state.
+    pub(crate) fn steady_states(&self, e: &[f64]) -> Vec<f64> {
+        let mut rest = e;
+        let of = |section: &Section| {
+            let (own, others) = rest.split_at(section.order());
+            rest = others;
+            section.steady(&Matrix::from_column_slice(own.len(), 1, own)).as_slice().to_vec()
+        };
+        self.sections.iter().flat_map(of).collect()
+    }
+
     /// `C (I - A)^-1 E`, (outputs): the outputs in steady state where E is added to each next state.
     pub(crate) fn gains_from_states(&self, e: &[f64]) -> DVector<f64> {
-        let mut sum = DVector::zeros(self.outputs());
-        let mut rest = e;
-        for section in &self.sections {
-            let (own, others) = rest.split_at(section.order());
-            let drive = Matrix::from_column_slice(own.len(), 1, own);
-            sum += (&section.c * section.steady(&drive)).column(0);
-            rest = others;
-        }
-        sum
+        self.c() * DVector::from_vec(self.steady_states(e))
     }
 
     /// The same with some of the poles only, complex ones in pairs, and with D as it is.

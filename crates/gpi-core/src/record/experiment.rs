@@ -91,6 +91,21 @@ impl Experiment {
         part
     }
 
+    /// Holds these samples out as well.
+    pub(crate) fn hold_out(&mut self, ranges: impl IntoIterator<Item = Range<usize>>) {
+        self.held_out.extend(ranges.into_iter().map(|held| held.start.max(self.warmup)..held.end));
+        self.held_out.retain(|held| held.start < held.end);
+        self.held_out.sort_by_key(|held| held.start);
+        let mut joined: Vec<Range<usize>> = Vec::new();
+        for held in self.held_out.drain(..) {
+            match joined.last_mut() {
+                Some(last) if held.start <= last.end => last.end = last.end.max(held.end),
+                _ => joined.push(held),
+            }
+        }
+        self.held_out = joined;
+    }
+
     /// Rejects a warm-up without a scored sample behind it, and held-out ranges that are not ascending behind it.
     pub(super) fn validate_scored(&self) -> Result<(), Error> {
         let (rows, warmup) = (self.input.nrows(), self.warmup);

@@ -200,6 +200,14 @@ static real power(real z, int exponent, real scale)
 }
 
 @end
+@excess
+static real excess(real z, real limit, int is_lower)
+{
+    const real beyond = z - limit;
+    return (is_lower ? beyond < 0 : beyond > 0) ? beyond : 0;
+}
+
+@end
 @stops
 static real stops(real *places, real z, const real *widths, const real *weights, int count)
 {

@@ -156,6 +156,13 @@ fn power(z: Real, exponent: u32, scale: Real) -> Real {
     (0..exponent).fold(scale, |w, _| w * (z / scale))
 }
 @end
+@excess
+
+fn excess(z: Real, limit: Real, is_lower: i32) -> Real {
+    let beyond = z - limit;
+    if is_lower != 0 { beyond.min(0.0) } else { beyond.max(0.0) }
+}
+@end
 @stops
 
 fn stops(places: &mut [Real], z: Real, widths: &[Real], weights: &[Real]) -> Real {

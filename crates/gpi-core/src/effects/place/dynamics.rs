@@ -38,7 +38,7 @@ pub trait ClosedLoops: Block {
     fn loops(&self) -> &[InnerLoop];
 
     /// The same, to be changed.
-    fn loops_mut(&mut self) -> &mut [InnerLoop];
+    fn loops_mut(&mut self) -> &mut Vec<InnerLoop>;
 
     /// What the loops do in steady state, as an engineer reads it, where the force of a loop is known.
     fn in_steady_state(

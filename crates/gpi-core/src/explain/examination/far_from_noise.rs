@@ -18,7 +18,7 @@
 //!   than a part of the squares of the balance of forces ([`crate::explain::force_balance`]);
 //! - a slow function of time, because it can follow any slow error, unless it leaves no more than a part of the squares of the best model
 //!   without it and the output does not integrate the input: an integral of errors is slow;
-//! - creep, unless it leaves no more than a part of the squares of the best model without it;
+//! - creep, and limits of states, unless they leave no more than a part of the squares of the best model without them;
 //! - a hysteretic force in such a loop that leaves more than a part of the squares of the best model without it, because it
 //!   resembles a hysteresis before the dynamics.
 //!
@@ -55,13 +55,9 @@ pub(super) fn doubt(
         return Ok(None);
     }
     let policy = &state.setup.policy.examination;
-    let test = state.setup.test.scored().max(1) as f64;
-    let trained = state.prepared.record.scored().max(1) as f64;
-    let noise = state.noise_squares()? / trained;
-    let is_near = state.held_out(point)?.iter().sum::<f64>() / test <= policy.near.powi(2) * noise;
     let mut leaves =
         |part: f64| Ok::<bool, Error>(state.cost > part * state.best_without(place, progress)?.1);
-    if is_near {
+    if is_near(state, point)? {
         Ok(None)
     } else if exceedances(&of, &state.prepared.record).is_some_and(|n| n < policy.exceedances) {
         Ok(Some(Refusal::TooRare))
@@ -77,6 +73,8 @@ pub(super) fn doubt(
             let found = balance(record, point.dynamics.delay, own.loops(), balanced);
             let is_explained = found.is_some_and(|own| 1.0 - own.explained <= policy.left);
             Ok((!is_explained).then_some(Refusal::Integrates))
+        } else if point.effects[place].limits() {
+            Ok(leaves(policy.left_at_most)?.then_some(Refusal::Insubstantial))
         } else {
             let is_weak =
                 own.loops().iter().any(|inner| inner.law.is_dissipative()) && leaves(policy.left)?;
@@ -92,6 +90,15 @@ pub(super) fn doubt(
     } else {
         Ok(None)
     }
+}
+
+/// Whether a model is near the noise on what is held out.
+pub(super) fn is_near(state: &SearchState, point: &Point) -> Result<bool, Error> {
+    let test = state.setup.test.scored().max(1) as f64;
+    let trained = state.prepared.record.scored().max(1) as f64;
+    let noise = state.noise_squares()? / trained;
+    let most = state.setup.policy.examination.near.powi(2) * noise;
+    Ok(state.held_out(point)?.iter().sum::<f64>() / test <= most)
 }
 
 /// How many times the input is faster than an input stage passes unchanged, for one sample or several in a row; `None`

@@ -13,12 +13,16 @@
 //!
 //! 3. *Its own part*: what it adds to the output differs from all that the rest of the model can do ([`own_part`]), or a fit
 //!    without it leaves more than the noise. The latter does not count for a slow function of time. A force inside the mechanics of a
-//!    stage that integrates its input is not asked: the error of a simulation is there the sum of all small forces.
+//!    stage that integrates its input is not asked: the error of a simulation is there the sum of all small forces. Nor are limits of
+//!    states, while the model is far from the noise: what they do is no small change of the rest.
 //! 4. *Slow*: a slow function of time is slower than the lags of G, and predicts gaps between its knots as well as it fits
 //!    ([`gaps`]).
 //! 5. *Small, or at the noise*: an effect that is a large part of the output, acts a few times only, or acts like a misfit
 //!    of the hysteresis has brought the model near the noise ([`far_from_noise`]). Where it leaves much unexplained, it
 //!    follows another structure.
+//!
+//! A limit inside the dynamics must also explain samples at which the output is within its limits ([`within_limits`]); those at its
+//! limits alone may be the sensor's.
 //!
 //! What does not pass is not tried again, and the search goes on without it.
 
@@ -26,6 +30,7 @@ mod contribution;
 mod far_from_noise;
 mod gaps;
 mod own_part;
+mod within_limits;
 
 use super::judgement::{Evidence, Refusal, judge};
 use super::outside::saturates;
@@ -67,6 +72,10 @@ pub(super) fn examine(
         Some(refusal)
     } else if !is_mode(state, trial)? {
         Some(Refusal::NotAMode)
+    } else if trial.point.effects[place].limits()
+        && !within_limits::explains_more(state, trial, place, progress)?
+    {
+        Some(Refusal::ClipsOnly)
     } else {
         None
     };
@@ -94,15 +103,19 @@ pub(super) fn doubt(
     if let Some(refusal) = impossible(state, point, place)? {
         return Ok(Some(refusal));
     }
-    if matches!(point.effects[place].place(), Place::Loops(_)) && is_saturated(state)? {
+    let effect = &point.effects[place];
+    let is_force = matches!(effect.place(), Place::Loops(_)) && !effect.limits();
+    if is_force && is_saturated(state)? {
         return Ok(Some(Refusal::Saturates));
     }
     let is_slow = point.effects[place].entry().signature == Signature::SlowInTime;
     // where the output integrates the input, forces are judged by their balance
     let is_balanced =
         matches!(point.effects[place].place(), Place::Loops(_)) && state.integrates()?;
+    let is_large = effect.limits() && !far_from_noise::is_near(state, point)?;
     // what a slow function of time does beyond the bounds of a slower creep, for example, says nothing of its cause
     if !is_balanced
+        && !is_large
         && !own_part::is_beyond_chance(state, point, place, state.cost)?
         && (is_slow || !is_needed(state, place, progress)?)
     {
@@ -157,10 +170,18 @@ fn is_mode(state: &SearchState, trial: &Trial) -> Result<bool, Error> {
 fn impossible(state: &SearchState, point: &Point, place: usize) -> Result<Option<Refusal>, Error> {
     let effect = &point.effects[place];
     if let Place::Loops(closed) = effect.place() {
+        let most = state.setup.policy.examination.excess;
+        let mut limits = closed.loops().iter();
+        if effect.limits() && !limits.any(|inner| within_limits::is_stiff(point, inner, most)) {
+            return Ok(Some(Refusal::Impossible));
+        }
         // a mass without a spring shows what acts on it by integrating
         let dissipates = closed.loops().iter().any(|inner| inner.law.is_dissipative());
-        let shows = point.dynamics.has_resonance() || (dissipates && state.integrates()?);
-        if !shows {
+        let shows = point.dynamics.has_resonance()
+            || (dissipates && state.integrates()?)
+            // what fills up to a limit is known to leak
+            || (!dissipates && point.effects.iter().any(Effect::limits));
+        if !effect.limits() && !shows {
             return Ok(Some(Refusal::NoResonance));
         }
         if closed.loops().iter().any(|inner| adds_energy(point, inner)) {

@@ -68,6 +68,35 @@ pub(super) fn saturates(
     Ok((0..scaled.outputs().len()).any(of))
 }
 
+/// The limits of an output: its largest and its smallest value where it stands there while the input moves, each with whether it is
+/// the smallest.
+pub(super) fn limits(
+    record: &Record,
+    output: usize,
+    policy: &OutsidePolicy,
+) -> Result<Vec<(f64, bool)>, Error> {
+    let scaled = Units::of(record).scaled(record)?;
+    let [at_largest, at_smallest] = saturation::clipped(&scaled, output, policy).at;
+    let columns = || record.experiments().iter().map(|run| run.output.column(output));
+    let largest = columns().map(|column| column.max()).fold(f64::NEG_INFINITY, f64::max);
+    let smallest = columns().map(|column| column.min()).fold(f64::INFINITY, f64::min);
+    let all = [(at_largest, (largest, false)), (at_smallest, (smallest, true))];
+    Ok(all.into_iter().filter_map(|(is_limit, limit)| is_limit.then_some(limit)).collect())
+}
+
+/// The record without the samples at which an output stands at a limit while the input moves: they are held out.
+pub(super) fn within_limits(record: &Record, policy: &OutsidePolicy) -> Result<Record, Error> {
+    let scaled = Units::of(record).scaled(record)?;
+    let mut experiments = record.experiments().to_vec();
+    for output in 0..record.outputs().len() {
+        let runs = saturation::clipped(&scaled, output, policy).runs;
+        for (experiment, runs) in experiments.iter_mut().zip(runs) {
+            experiment.hold_out(runs);
+        }
+    }
+    record.with_experiments(experiments)
+}
+
 /// Asks all questions.
 pub(super) fn outside(of: &Situation, policy: &OutsidePolicy) -> Result<Answer, Error> {
     let rivals = RivalPolicy::default();

@@ -11,8 +11,10 @@ use std::ops::Range;
 /// Clipped samples of one output.
 pub(super) struct Clipped {
     /// Runs of each experiment.
-    runs: Vec<Vec<Range<usize>>>,
+    pub(super) runs: Vec<Vec<Range<usize>>>,
     samples: usize,
+    /// Whether they stand at the largest value, and whether some stand at the smallest.
+    pub(super) at: [bool; 2],
 }
 
 impl Clipped {
@@ -30,8 +32,8 @@ impl Clipped {
 pub(super) fn clipped(record: &Record, output: usize, policy: &OutsidePolicy) -> Clipped {
     let samples = record.samples();
     let none = || vec![Vec::new(); record.experiments().len()];
-    let mut found = Clipped { runs: none(), samples };
-    for sign in [1.0, -1.0] {
+    let mut found = Clipped { runs: none(), samples, at: [false; 2] };
+    for (end, sign) in [1.0, -1.0].into_iter().enumerate() {
         let values = || {
             record
                 .experiments()
@@ -42,7 +44,7 @@ pub(super) fn clipped(record: &Record, output: usize, policy: &OutsidePolicy) ->
         let below = values().map(|y| sign * y).filter(|y| *y < extreme);
         let next = below.fold(f64::NEG_INFINITY, f64::max);
         let at_next = values().filter(|y| sign * y == next).count();
-        let mut own = Clipped { runs: none(), samples };
+        let mut own = Clipped { runs: none(), samples, at: [false; 2] };
         for (experiment, runs) in record.experiments().iter().zip(&mut own.runs) {
             let stands = |k: usize| sign * experiment.output[(k, output)] == extreme;
             *runs = runs_of(experiment.input.nrows(), stands);
@@ -50,6 +52,7 @@ pub(super) fn clipped(record: &Record, output: usize, policy: &OutsidePolicy) ->
         }
         let is_limit = own.count() as f64 > policy.crowded * at_next as f64;
         if is_limit && own.share() > policy.clipped {
+            found.at[end] = true;
             for (all, own) in found.runs.iter_mut().zip(own.runs) {
                 all.extend(own);
             }
