@@ -8,9 +8,10 @@ use nalgebra::DVector;
 
 type Vector = DVector<f64>;
 
-/// Relative increase of the diagonal of the Gram matrix: far below what data determine, and above the rounding error of
-/// the sums of squares.
-const REGULARIZATION: f64 = 1e-14;
+/// Relative increases of the diagonal of the Gram matrix, of which the smallest is taken that makes it positive definite: far below what
+/// data determine. The first is above the rounding error of most sums of squares. That of a decomposition grows with the number of
+/// unknowns that depend on each other.
+const REGULARIZATIONS: [f64; 3] = [1e-14, 1e-12, 1e-10];
 
 /// A gradient below this fraction of the largest right side counts as zero: above its rounding error, so that rounding
 /// does not free an unknown at its bound.
@@ -93,9 +94,16 @@ fn add_squares(gram: &mut Matrix, factor: &Matrix) {
 pub(crate) fn bounded(gram: &Arrow, rhs: &Vector, lower: &Vector, upper: &Vector) -> Vector {
     let scale = gram.diagonal().map(|square| if square > 0.0 { square.sqrt() } else { 1.0 });
     let mut scaled = gram.scaled(&scale);
-    scaled.set_diagonal(&scaled.diagonal().add_scalar(REGULARIZATION));
+    let diagonal = scaled.diagonal();
     let target = rhs.component_div(&scale);
     let (low, high) = (lower.component_mul(&scale), upper.component_mul(&scale));
+    let is_free: Vec<bool> = lower.iter().zip(upper).map(|(low, high)| low < high).collect();
+    for regularization in REGULARIZATIONS {
+        scaled.set_diagonal(&diagonal.add_scalar(regularization));
+        if ArrowSolver::new(&scaled).solve(&target, &is_free).is_some() {
+            break;
+        }
+    }
     let found = pivoted(&scaled, &target, &low, &high);
     let found = found.unwrap_or_else(|| active_set(&scaled, &target, &low, &high));
     // exactly the bound, not one that was multiplied and divided: what stands there is known to be held
@@ -210,6 +218,18 @@ fn passive_solution(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_step_is_taken_where_rounding_spoils_the_matrix() {
+        // two of the columns are the same, and the sum of squares is off by rounding
+        let a = Matrix::from_fn(40, 4, |i, j| ((i * (j % 3 + 2)) as f64 * 0.61).sin());
+        let b = DVector::from_fn(40, |i, _| (i as f64 * 0.37).cos());
+        let (mut gram, rhs) = (a.tr_mul(&a), a.tr_mul(&b));
+        gram[(0, 0)] *= 1.0 - 3e-14;
+        let free = DVector::from_element(4, f64::INFINITY);
+        let x = bounded(&Arrow::from(gram.clone()), &rhs, &-&free, &free);
+        assert!((&gram * &x - &rhs).amax() < 1e-6 * rhs.amax(), "{x}");
+    }
 
     #[test]
     fn bounds_hold_and_the_conditions_of_optimality_too() {
