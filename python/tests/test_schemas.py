@@ -131,7 +131,7 @@ def with_one_more(value: Any, at: tuple[Any, ...]) -> None:
 CHANGES: list[Callable[[Any, tuple[Any, ...]], None]] = [without, of_another_type, with_one_more]
 #: Members that a file may have or not.
 OPTIONAL = {"files", "experiments", "notes", "holdout", "rule", "effects", "estimates", "prediction", "unit"}
-OPTIONAL |= {"undetermined", "moves_stage", "law", "picture", "period", "samples"}
+OPTIONAL |= {"undetermined", "moves_stage", "law", "picture", "period", "samples", "start"}
 
 
 @pytest.mark.parametrize(
