@@ -47,11 +47,13 @@ pub(super) fn enter_with_input(state: &mut SearchState, progress: Progress) -> R
 }
 
 /// The point in which every loop drives what its input drives, with the same force in steady state; `None` where all do, where there is
-/// no such force, or where there are several inputs or outputs.
+/// no such force, where a state has a limit, or where there are several inputs or outputs.
 fn with_input(point: &Point) -> Option<Point> {
     let is_single = point.channels.len() == 1 && point.dynamics.outputs() == 1;
     let is_own = |inner: &InnerLoop| matches!(inner.drives, Drives::States(_));
-    if !is_single || !point.loops().any(is_own) {
+    // what exceeds a limit is taken from a state, and is no force
+    let has_limits = point.loops().any(|inner| inner.law.limits());
+    if !is_single || has_limits || !point.loops().any(is_own) {
         return None;
     }
     let states = point.dynamics.order();

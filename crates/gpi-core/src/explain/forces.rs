@@ -7,6 +7,7 @@
 
 use super::force_balance::{Balance, balance, squares};
 use super::limits::limited;
+use super::outside::limits;
 use super::ranking::Ranked;
 use super::score::Score;
 use super::state::{SearchState, Trial};
@@ -65,11 +66,12 @@ pub(super) fn forces(
         let is_limit = |one: &Proposal<Effect>| one.block.limits();
         if proposals.iter().any(is_limit) {
             // more limits of a model that has some are tried by the score test
-            if state.has(entry) {
-                continue;
+            let ends = limits(record, 0, &policy.outside)?;
+            if !state.has(entry) && !ends.is_empty() {
+                let point = begin(state, &straight, linear.clone(), None);
+                let point = settled(state, point, entry, progress)?;
+                found.extend(limited(state, &point, ends, entry, progress)?);
             }
-            let point = begin(state, &straight, linear.clone(), None);
-            found.extend(limited(state, point, entry, progress)?);
             continue;
         }
         let Some((own, mut effect)) = best(state, &linear, proposals) else { continue };
@@ -172,7 +174,7 @@ fn begin(
 }
 
 /// A point with the offsets and initial states that fit best, all else held.
-pub(super) fn settled(
+fn settled(
     state: &SearchState,
     point: Point,
     entry: &Entry,

@@ -10,8 +10,6 @@
 //! Each loop begins with a column of E that takes the excess away from what it sees: `E = -S / |S|^2` for `z = S x`.
 
 use super::base::Base;
-use super::forces::settled;
-use super::outside::limits;
 use super::ranking::Ranked;
 use super::score::Score;
 use super::state::SearchState;
@@ -21,20 +19,16 @@ use crate::effects::{Drives, Effect, Entry, InnerLoop, Law, PlaceMut, Sees};
 use crate::fit::minimize::Fitted;
 use crate::progress::Progress;
 
-/// The best model with limits of an entry's kind, from linear dynamics without plays and deadzones; `None` where the output does not
-/// stand at a limit.
+/// The best model with limits of an entry's kind, from linear dynamics without plays and deadzones, whose offset and initial state are
+/// fitted. `ends` are the limits at which the output stands, each with whether it is a lower one.
 pub(super) fn limited(
     state: &SearchState,
-    linear: Point,
+    linear: &Point,
+    ends: Vec<(f64, bool)>,
     entry: &'static Entry,
     progress: Progress,
 ) -> Result<Option<Ranked>, Error> {
     let policy = &state.setup.policy.limits;
-    let ends = limits(&state.prepared.record, 0, &state.setup.policy.outside)?;
-    if ends.is_empty() {
-        return Ok(None);
-    }
-    let linear = settled(state, linear, entry, progress)?;
     let offset = linear.offsets[0][(0, 0)];
     let of_output = |(value, is_lower): (f64, bool)| InnerLoop {
         sees: Sees::Output(0),
@@ -42,7 +36,7 @@ pub(super) fn limited(
         drives: Drives::States(vec![0.0; linear.dynamics.order()]),
     };
     let loops = ends.into_iter().map(of_output).collect();
-    let Some(effect) = with_loops(state, &linear, entry, loops)? else { return Ok(None) };
+    let Some(effect) = with_loops(state, linear, entry, loops)? else { return Ok(None) };
     let mut best = fit(state, linear.with_effect(effect), entry, progress)?;
     let place = best.point.effects.len() - 1;
     let known = loops_of(&best.point.effects[place]);

@@ -179,7 +179,7 @@ fn impossible(state: &SearchState, point: &Point, place: usize) -> Result<Option
         let dissipates = closed.loops().iter().any(|inner| inner.law.is_dissipative());
         let shows = point.dynamics.has_resonance()
             || (dissipates && state.integrates()?)
-            // what fills up to a limit is known to leak
+            // a tank with a limit has a nonlinear outflow, and no resonance
             || (!dissipates && point.effects.iter().any(Effect::limits));
         if !effect.limits() && !shows {
             return Ok(Some(Refusal::NoResonance));

@@ -22,13 +22,17 @@ use crate::explain::state::{SearchState, Trial};
 use crate::fit::minimize::fit;
 use crate::{Error, Progress};
 
+/// Whether the limit at a place of a trial is significant among the samples within the output's limits; not where too few of them are
+/// left for a fit.
 pub(super) fn explains_more(
     state: &SearchState,
     trial: &Trial,
     place: usize,
     progress: Progress,
 ) -> Result<bool, Error> {
-    let record = within_limits(&state.prepared.record, &state.setup.policy.outside)?;
+    let Ok(record) = within_limits(&state.prepared.record, &state.setup.policy.outside) else {
+        return Ok(false);
+    };
     if record.scored() == state.prepared.record.scored() {
         return Ok(true);
     }
