@@ -22,8 +22,8 @@
 
 use super::hysteresis::Parameters;
 use super::point::{DynamicsFreedom, Freedom, Point};
-use crate::effects::Coefficients;
-use crate::linear::move_poles;
+use crate::effects::{Coefficients, Drives};
+use crate::linear::{Section, move_poles};
 use nalgebra::DVector;
 use std::ops::Range;
 
@@ -101,6 +101,8 @@ pub(crate) struct Table {
     rows: Vec<(Group, Range<usize>)>,
     /// Whether loops are closed around G.
     has_loops: bool,
+    /// Unknowns that are the coefficients of z^1 and z^0 of a polynomial of a section.
+    pairs: Vec<[usize; 2]>,
     /// How many unknowns there are.
     pub len: usize,
 }
@@ -115,8 +117,10 @@ impl Table {
             len += group.read(point).len();
             (group, first..len)
         };
-        let rows = free.map(row).collect();
-        Self { rows, has_loops: point.loops().next().is_some(), len }
+        let rows: Vec<_> = free.map(row).collect();
+        let pairs =
+            rows.iter().flat_map(|(group, range)| group.pairs(point, range.start)).collect();
+        Self { rows, has_loops: point.loops().next().is_some(), pairs, len }
     }
 
     /// All rows in the order of the unknowns.
@@ -138,7 +142,7 @@ impl Table {
             rows.push((*group, places.len()..places.len() + range.len()));
             places.extend(range.clone());
         }
-        (Self { rows, has_loops: self.has_loops, len: places.len() }, places)
+        (Self { rows, has_loops: self.has_loops, pairs: Vec::new(), len: places.len() }, places)
     }
 
     /// The unknowns of each experiment that move no other one's output. The only experiment has none: nothing else
@@ -168,6 +172,11 @@ impl Table {
             Some((Weights { .. } | State { .. }, _)) => !self.has_loops,
             _ => false,
         }
+    }
+
+    /// Pairs of unknowns p and q of a polynomial `.. + p z + q`.
+    pub(crate) fn pairs(&self) -> &[[usize; 2]] {
+        &self.pairs
     }
 
     /// The value of every unknown.
@@ -206,6 +215,19 @@ fn groups(point: &Point) -> Vec<Group> {
     all
 }
 
+/// The places of both states of each section of two poles, of sections of such orders from a place on.
+fn paired(orders: impl IntoIterator<Item = usize>, first: usize) -> Vec<[usize; 2]> {
+    let mut next = first;
+    let mut pairs = Vec::new();
+    for order in orders {
+        if order == 2 {
+            pairs.push([next, next + 1]);
+        }
+        next += order;
+    }
+    pairs
+}
+
 /// The sections of an effect.
 fn sections(point: &Point, place: usize) -> Vec<Coefficients> {
     let own = point.effects[place].place().parallel_sections();
@@ -234,6 +256,38 @@ impl Group {
                 derivatives.starts && point.pasts[experiment].plays.is_some()
             }
             State { experiment } => freedom.states && point.pasts[experiment].has_unknown_state,
+        }
+    }
+
+    /// Those of its unknowns, counted from the first one's place, that are coefficients `.. + p z + q` of a section of two poles. In the
+    /// observer form of the sections, so are what is driven of their states, and initial states.
+    fn pairs(self, point: &Point, first: usize) -> Vec<[usize; 2]> {
+        let of_g = || point.dynamics.sections.iter().map(Section::order);
+        match self {
+            Denominator { section } => paired([point.dynamics.sections[section].order()], first),
+            Numerator { section } => {
+                let section = &point.dynamics.sections[section];
+                paired(section.b.column_iter().map(|_| section.order()), first)
+            }
+            ParallelDenominator { place, section } | ParallelNumerator { place, section } => {
+                paired([sections(point, place)[section].0.len()], first)
+            }
+            Effect { place } => {
+                let closed = point.effects[place].place().closed_loops();
+                let loops = closed.map_or(&[][..], |closed| closed.loops());
+                let mut first = first;
+                let mut pairs = Vec::new();
+                for inner in loops {
+                    if let Drives::States(column) = &inner.drives {
+                        let is_driven = |pair: &[usize; 2]| pair[1] < first + column.len();
+                        pairs.extend(paired(of_g(), first).into_iter().filter(is_driven));
+                    }
+                    first += inner.linear_values() + inner.law.values();
+                }
+                pairs
+            }
+            State { .. } => paired(point.sections().iter().map(Section::order), first),
+            _ => Vec::new(),
         }
     }
 
@@ -334,5 +388,46 @@ impl Point {
         }
         moved.bound_limits();
         moved
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::hysteresis::Parameters;
+    use crate::chain::looped::{model, record, run};
+    use crate::chain::sensitivity::Derivatives;
+    use crate::fit::preparation::Prepared;
+
+    #[test]
+    fn the_coefficients_of_two_poles_are_pairs() {
+        let model = model();
+        let record = record(&model, vec![run(1.5, 0.3, 0, vec![])]);
+        let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
+        let prepared = Prepared::scoring_all(&record, channels).unwrap();
+        let point = prepared.point_of(&model).unwrap();
+        let freedom = Freedom {
+            weights: true,
+            offsets: true,
+            derivatives: Derivatives { thresholds: true, half_widths: true, starts: true },
+            states: true,
+            identity: true,
+            dynamics: DynamicsFreedom::Everything,
+        };
+        let table = Table::new(&point, freedom);
+        let names = table.names(&point, &record);
+        let found: Vec<String> =
+            table.pairs().iter().map(|[p, q]| format!("{} {}", names[*p], names[*q])).collect();
+        // two poles and one; of eight loops, one drives where the input does
+        let drives = [0, 12, 15, 23, 26, 30, 34];
+        let drives = drives.map(|i| format!("stiffness.value[{i}] stiffness.value[{}]", i + 1));
+        let mut wanted = vec![
+            "section[0].a1 section[0].a2".to_owned(),
+            "section[0].b1[u0] section[0].b2[u0]".to_owned(),
+            "section[0].b1[u1] section[0].b2[u1]".to_owned(),
+        ];
+        wanted.extend(drives);
+        wanted.push("start[0].state[0] start[0].state[1]".to_owned());
+        assert_eq!(found, wanted);
     }
 }

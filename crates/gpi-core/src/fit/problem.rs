@@ -120,6 +120,10 @@ impl LeastSquares for Estimation<'_> {
         self.table.is_linear(unknown)
     }
 
+    fn pairs(&self) -> &[[usize; 2]] {
+        self.table.pairs()
+    }
+
     /// What rounding leaves of the outputs' squares.
     fn rounding(&self) -> f64 {
         let outputs = self.record.experiments().iter().flat_map(|e| e.output.column_iter());

@@ -1,7 +1,8 @@
 //! Gauss-Newton steps with Levenberg's and Marquardt's damping, within bounds.
 
 use super::{LeastSquares, Linearization, SolverSettings};
-use crate::linear::bounded;
+use crate::Matrix;
+use crate::linear::{Arrow, bounded};
 
 /// How a fit ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -63,13 +64,7 @@ pub(crate) fn levenberg_marquardt<L: LeastSquares>(
     let mut bounds = problem.bounds(&point);
     for number in 1..=steps {
         let done = number as f64 / steps as f64;
-        let mut gram = current.gram.clone();
-        let is_damped = |i: &usize| current.is_approximate() || !problem.is_linear(*i);
-        let mut diagonal = gram.diagonal();
-        for i in (0..gram.len()).filter(is_damped) {
-            diagonal[i] *= 1.0 + damping;
-        }
-        gram.set_diagonal(&diagonal);
+        let gram = damped(&current, problem, damping);
         let step = bounded(&gram, &current.descent, &bounds.lower, &bounds.upper);
         let predicted = current.predicted(&step);
         // also where the bounds leave no way to go, or all is explained to the last digit
@@ -124,4 +119,24 @@ pub(crate) fn levenberg_marquardt<L: LeastSquares>(
         }
     }
     Ok(Minimum { point, linearization: current, history, status })
+}
+
+/// The Gram matrix with damping: `damping diag(gram)` is added. Two coefficients of a polynomial `.. + p z + q` of poles near one hardly
+/// differ in what they do, so that a step along which they act against each other would be damped most. They are
+/// damped as coefficients of z - 1 instead: with `p z + q = p (z - 1) + (p + q)`, a step of p alone is one of (p, q) = (1, -1).
+fn damped<L: LeastSquares>(current: &Linearization, problem: &L, damping: f64) -> Arrow {
+    let mut gram = current.gram.clone();
+    let is_damped = |i: &usize| current.is_approximate() || !problem.is_linear(*i);
+    let mut diagonal = gram.diagonal();
+    for i in (0..gram.len()).filter(is_damped) {
+        diagonal[i] *= 1.0 + damping;
+    }
+    gram.set_diagonal(&diagonal);
+    for &[p, q] in problem.pairs().iter().filter(|[p, q]| is_damped(p) && is_damped(q)) {
+        let [pp, pq, qq] = [(p, p), (p, q), (q, q)].map(|(i, j)| current.gram.get(i, j));
+        let against = (pp - 2.0 * pq + qq).max(0.0);
+        let more = Matrix::from_row_slice(2, 2, &[against + qq - pp, qq, qq, 0.0]);
+        gram.add_part(&(damping * more), &[p, q]);
+    }
+    gram
 }

@@ -18,12 +18,14 @@ struct Problem {
     loss: Loss,
     /// Whether the curvature pretends to be that of a part of the residuals.
     approximate: bool,
+    /// Unknowns that are two coefficients of a polynomial.
+    pairs: Vec<[usize; 2]>,
 }
 
 impl Problem {
     fn new(residuals: impl Fn(&DVector<f64>) -> (DVector<f64>, Matrix) + 'static) -> Self {
         let (bounds, loss) = (None, Loss::squares(1));
-        Self { residuals: Box::new(residuals), bounds, loss, approximate: false }
+        Self { residuals: Box::new(residuals), bounds, loss, approximate: false, pairs: Vec::new() }
     }
 
     fn minimum(&self, start: &[f64]) -> Minimum<DVector<f64>> {
@@ -76,9 +78,60 @@ impl LeastSquares for Problem {
         false
     }
 
+    fn pairs(&self) -> &[[usize; 2]] {
+        &self.pairs
+    }
+
     fn rounding(&self) -> f64 {
         1e-30
     }
+}
+
+/// What `1 / (1 + a_1 q^-1 + a_2 q^-2)` makes of a signal.
+fn divided(signal: impl Iterator<Item = f64>, a: [f64; 2]) -> Vec<f64> {
+    let mut last = [0.0; 2];
+    let next = |value: f64| {
+        last = [value - a[0] * last[0] - a[1] * last[1], last[0]];
+        last[0]
+    };
+    signal.map(next).collect()
+}
+
+/// Two lags of 800 and 170 samples, `y = (b_1 q^-1 + b_2 q^-2) / (1 + a_1 q^-1 + a_2 q^-2) u`, from lags of 500 and 250 samples (Ljung,
+/// *System Identification*, 1999, section 10.3, output error). All four coefficients hardly differ in what they do.
+#[test]
+fn coefficients_of_two_slow_lags_are_found_in_a_few_steps() {
+    const SAMPLES: usize = 6000;
+    let u = |k: usize| (2.399 * (k / 300) as f64).sin();
+    let delayed = move |by: usize| (0..SAMPLES).map(move |k| if k < by { 0.0 } else { u(k - by) });
+    let coefficients = |constants: [f64; 2]| {
+        let [p, q] = constants.map(|constant: f64| (-1.0 / constant).exp());
+        [-p - q, p * q, 0.0, (1.0 - p) * (1.0 - q)]
+    };
+    let output = move |x: &[f64]| -> Vec<f64> {
+        let driven = delayed(1).zip(delayed(2)).map(|(first, second)| x[2] * first + x[3] * second);
+        divided(driven, [x[0], x[1]])
+    };
+    let wanted = coefficients([800.0, 170.0]);
+    let measured = output(&wanted);
+    let steps = |pairs: Vec<[usize; 2]>| {
+        let measured = measured.clone();
+        let problem = Problem::new(move |x| {
+            let (a, y) = ([x[0], x[1]], output(x.as_slice()));
+            let past =
+                |by: usize| std::iter::repeat_n(0.0, by).chain(y.iter().map(|y| -y)).take(SAMPLES);
+            let columns = [divided(past(1), a), divided(past(2), a)];
+            let columns = columns.into_iter().chain([1, 2].map(|by| divided(delayed(by), a)));
+            let residuals = measured.iter().zip(&y).map(|(measured, y)| measured - y);
+            let columns: Vec<f64> = columns.flatten().collect();
+            (DVector::from_iterator(SAMPLES, residuals), Matrix::from_vec(SAMPLES, 4, columns))
+        });
+        let found = Problem { pairs, ..problem }.minimum(&coefficients([500.0, 250.0]));
+        (is_near(&found.point, &wanted, 1e-9), found.history.len())
+    };
+    let (is_found, few) = steps(vec![[0, 1], [2, 3]]);
+    let (_, many) = steps(Vec::new());
+    assert!(is_found && few < 10 && many > 10, "{is_found} {few} {many}");
 }
 
 /// H. H. Rosenbrock (1960): a curved valley, minimum 0 at (1, 1).
