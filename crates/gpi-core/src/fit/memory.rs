@@ -81,6 +81,11 @@ impl Memory {
         Ok(point.dynamics.poles().into_iter().filter(is_slow).collect())
     }
 
+    /// The fewest samples that show a plant to be slow.
+    pub(crate) fn enough(&self) -> usize {
+        self.enough
+    }
+
     /// Whether poles that are slower than the lags of a mechanical stage, and do not resonate, carry the movement.
     pub(crate) fn is_slow_plant(&self, point: &Point, prepared: &Prepared) -> Result<bool, Error> {
         let is_fast = |pole: &Complex<f64>| resonates(pole) || time_constant(pole) <= self.lag;

@@ -139,6 +139,9 @@ pub(super) fn compare_elements(
             search.orders(&mut few, settings, progress)?;
         }
     }
+    if let Some(best) = search.best() {
+        search.without_plays(&best, progress)?;
+    }
     enrich(&mut search, quick, progress)?;
     let stages = (Some(seed.taps), seed.singular_values, seed.reflected, seed.rounds);
     compared(search, false, stages, supported)

@@ -20,8 +20,8 @@ use crate::progress::{Progress, report};
 use crate::{Error, Experiment, Matrix, Record};
 use std::cmp::Reverse;
 
-/// The best pair of lags of a plant that is linear otherwise; `None` where the plant is not slow, by a first estimate of it
-/// and by these lags.
+/// The best pair of lags of a plant that is linear otherwise; `None` where the plant is not slow by these lags, or neither a first
+/// estimate of it is slow nor a single lag leaves a smaller error. Where one does, the estimate is wrong.
 pub(super) fn seed(
     estimate: &Point,
     prepared: &Prepared,
@@ -29,28 +29,30 @@ pub(super) fn seed(
     progress: Progress,
 ) -> Result<Option<Point>, Error> {
     let memory = Memory::of(&prepared.record);
-    if !memory.is_slow_plant(estimate, prepared)? {
+    if prepared.record.longest() < memory.enough() {
         return Ok(None);
     }
+    let is_slow = memory.is_slow_plant(estimate, prepared)?;
     let SlowPolicy { shortest, longest, ratio, stretches } = *policy;
     let longest = longest * prepared.record.longest() as f64;
     let constants: Vec<f64> =
         std::iter::successors(Some(shortest), |constant| Some(ratio * constant))
             .take_while(|&constant| constant <= longest)
             .collect();
-    let size = (prepared.record.outputs().len(), prepared.record.inputs().len());
     let record = longest_of(&prepared.record, stretches)?;
-    let mut best: Option<Refit> = None;
-    for (place, first) in constants.iter().enumerate() {
-        for second in &constants[place + 1..] {
-            report(progress, "slow lags", place as f64 / constants.len() as f64)?;
-            let Ok(found) = refit(&record, lags(&[*first, *second], size)?) else { continue };
-            if best.as_ref().is_none_or(|best| found.rms < best.rms) {
-                best = Some(found);
-            }
+    if !is_slow {
+        let singles: Vec<_> = constants.iter().map(|&constant| vec![constant]).collect();
+        let single = best_of(&record, &singles, progress)?;
+        let rms = prepared.free_run(&mut estimate.clone())?;
+        if single.is_none_or(|single| single.rms >= rms) {
+            return Ok(None);
         }
     }
-    let Some(best) = best else { return Ok(None) };
+    let with_slower = |(place, &first): (usize, &f64)| -> Vec<Vec<f64>> {
+        constants[place + 1..].iter().map(|&second| vec![first, second]).collect()
+    };
+    let pairs: Vec<_> = constants.iter().enumerate().flat_map(with_slower).collect();
+    let Some(best) = best_of(&record, &pairs, progress)? else { return Ok(None) };
     let mut point = prepared.point(Sections::from_state_space(&best.system, 0)?);
     if !memory.is_slow_plant(&point, prepared)? {
         return Ok(None);
@@ -58,6 +60,24 @@ pub(super) fn seed(
     prepared.free_run(&mut point)?;
     rescale(&mut point);
     Ok(Some(point))
+}
+
+/// The lags that leave the least squares, if any can be fitted.
+fn best_of(
+    record: &Record,
+    constants: &[Vec<f64>],
+    progress: Progress,
+) -> Result<Option<Refit>, Error> {
+    let size = (record.outputs().len(), record.inputs().len());
+    let mut best: Option<Refit> = None;
+    for (place, own) in constants.iter().enumerate() {
+        report(progress, "slow lags", place as f64 / constants.len() as f64)?;
+        let Ok(found) = refit(record, lags(own, size)?) else { continue };
+        if best.as_ref().is_none_or(|best| found.rms < best.rms) {
+            best = Some(found);
+        }
+    }
+    Ok(best)
 }
 
 /// So many stretches of scored samples, the longest ones.

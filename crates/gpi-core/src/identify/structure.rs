@@ -67,6 +67,11 @@ impl<'a> StructureSearch<'a> {
         self.comparison.shows_nothing_fast()
     }
 
+    /// The refined point of the best candidate.
+    pub(super) fn best(&self) -> Option<Point> {
+        self.comparison.best().cloned()
+    }
+
     /// Whether the samples are few for the parameters of the best candidate.
     pub(super) fn is_crowded(&self) -> bool {
         self.comparison.is_crowded()
@@ -203,6 +208,20 @@ impl<'a> StructureSearch<'a> {
         Ok(())
     }
 
+    /// Tries a curve without memory, such as that of a valve, behind the dynamics of a point, where no grid is given: the structures of the
+    /// ladder with as many deadzones have plays too.
+    pub(super) fn without_plays(&mut self, point: &Point, progress: Progress) -> Result<(), Error> {
+        if self.half_widths.is_some() || self.thresholds.is_some() {
+            return Ok(());
+        }
+        let deadzones = Grid::Count(self.comparison.policy.deadzones[0]);
+        let curve = self.placed(point, &Grid::Count(1), &deadzones, progress);
+        if let Ok(curve) = Error::unless_interrupted(curve)? {
+            self.comparison.offer(curve, progress)?;
+        }
+        Ok(())
+    }
+
     /// Tries lags of a slow plant: refined behind a linear hysteresis first, whose few parameters do not follow what the first
     /// guess of the lags leaves, then behind the others.
     pub(super) fn slow(&mut self, seed: &Point, progress: Progress) -> Result<(), Error> {
@@ -210,7 +229,10 @@ impl<'a> StructureSearch<'a> {
         let placed = self.placed(seed, &half_widths, &thresholds, progress);
         let refined = placed.and_then(|linear| self.comparison.refined(linear, progress));
         match Error::unless_interrupted(refined)? {
-            Ok(linear) => self.climb(&linear, progress),
+            Ok(linear) => {
+                self.without_plays(&linear, progress)?;
+                self.climb(&linear, progress)
+            }
             // no model of this kind: the others stand
             Err(_) => Ok(()),
         }
