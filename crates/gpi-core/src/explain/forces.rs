@@ -6,6 +6,7 @@
 //! begins there, without plays and deadzones.
 
 use super::force_balance::{Balance, balance, squares};
+use super::judgement::Significance;
 use super::limits::limited;
 use super::outside::limits;
 use super::ranking::Ranked;
@@ -15,6 +16,7 @@ use crate::chain::point::{DynamicsFreedom, Point};
 use crate::effects::{
     Drives, Effect, Entry, InnerLoop, OutputKind, PlaceMut, Proposal, Situation, Stage,
 };
+use crate::fit::minimize::{FitOptions, Fitted};
 use crate::fit::preparation::rescale;
 use crate::linear::Sections;
 use crate::progress::Progress;
@@ -86,6 +88,30 @@ pub(super) fn forces(
     }
     found.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
     Ok(found)
+}
+
+/// The fit of a model that began at the balance of forces, or that of the same model whose G passes part of v at once, where it explains
+/// significantly more. The output of a mass answers an input that is held between samples one sample later; where the input is not
+/// held, part of the answer is there at once. A G that integrates has no gain by which D could be found.
+pub(super) fn with_feedthrough(
+    state: &SearchState,
+    fitted: Fitted,
+    options: &FitOptions,
+    entry: &Entry,
+    progress: Progress,
+) -> Result<Fitted, Error> {
+    if fitted.linearization.cost >= state.cost || state.integrates()? {
+        return Ok(fitted);
+    }
+    let mut point = fitted.point.clone();
+    point.dynamics = point.dynamics.with_free_feedthrough();
+    rescale(&mut point);
+    let freed = state.fit(point, options, entry.name, progress)?;
+    let (values, is_long) = (state.prepared.values(), state.setup.is_long(&freed.point));
+    let significance = Significance { values, added: 1, is_long, is_more: false };
+    let deviance = values * (fitted.linearization.cost / freed.linearization.cost).ln();
+    let is_found = deviance > significance.threshold(&state.setup.policy.judgement);
+    Ok(if is_found { freed } else { fitted })
 }
 
 /// Remembers the forces whose fits ended so far above the model that other effects beside them change nothing about it.

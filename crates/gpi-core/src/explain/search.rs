@@ -205,7 +205,7 @@ fn evidence<'a>(
         noise,
         held_out,
         is_driven: trial.is_driven,
-        is_simpler: state.setup.unknowns(&trial.point) < state.setup.unknowns(&state.point),
+        is_simpler: state.setup.estimated(&trial.point) < state.setup.estimated(&state.point),
         is_unique: trial.entry.signature == Signature::Unique,
         is_more: state.is_more(trial.entry),
         is_plausible: state.is_plausible(&trial.point),

@@ -78,6 +78,13 @@ impl SearchSetup {
         Table::new(point, self.options.freedom).len
     }
 
+    /// How many of them are not held.
+    pub(super) fn estimated(&self, point: &Point) -> usize {
+        let freedom = self.options.freedom;
+        let table = Table::new(point, freedom);
+        point.bounds(&table, &self.measured, freedom).estimated().len()
+    }
+
     /// Whether derivatives of the whole record would take long.
     pub(super) fn is_long(&self, point: &Point) -> bool {
         representatives(point, &self.measured, self.unknowns(point)).is_some()

@@ -22,6 +22,7 @@
 //! which is 1 for white noise, and the threshold is raised by it.
 
 use super::concurrently::concurrently;
+use super::forces::with_feedthrough;
 use super::judgement::Significance;
 use super::policy::FitPolicy;
 use super::ranking::{Ranked, promised};
@@ -84,7 +85,8 @@ pub(super) fn trial(
             // where the output integrates, the balance of forces decides, whatever the squares
             let goal = if state.integrates()? { ANY } else { state.cost };
             let options = FitOptions { steps, goal, ..state.setup.options.clone() };
-            (state.fit(given, &options, entry.name, progress)?, options)
+            let fitted = state.fit(given, &options, entry.name, progress)?;
+            (with_feedthrough(state, fitted, &options, entry, progress)?, options)
         }
         None => fitted(state, start(state, &state.point, score)?, entry, ANY, progress)?,
     };
@@ -201,7 +203,7 @@ pub(super) fn measured(
     let deviance = values * (state.cost / cost.max(f64::MIN_POSITIVE)).ln();
     let significance = Significance {
         values,
-        added: state.setup.unknowns(&point).saturating_sub(state.setup.unknowns(&state.point)),
+        added: state.setup.estimated(&point).saturating_sub(state.setup.estimated(&state.point)),
         is_long: state.setup.is_long(&point),
         is_more: state.is_more(entry),
     };

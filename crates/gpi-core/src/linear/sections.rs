@@ -200,6 +200,12 @@ impl Sections {
         self
     }
 
+    /// The same with D free where it was held, so that the DC gain is held instead.
+    pub(crate) fn with_free_feedthrough(mut self) -> Self {
+        self.held = vec![Some((0, 0.0)); self.inputs()];
+        self.holding_present_gain()
+    }
+
     /// Gives every column of G whose DC gain is held a largest one of plus or minus one; returns what was divided by.
     pub(crate) fn normalize_gain(&mut self) -> Vec<f64> {
         let dc = self.dc_gain();
