@@ -12,10 +12,11 @@ use super::outside::limits;
 use super::ranking::Ranked;
 use super::score::Score;
 use super::state::{SearchState, Trial};
-use crate::chain::point::{DynamicsFreedom, Point};
+use crate::chain::point::Point;
 use crate::effects::{
     Drives, Effect, Entry, InnerLoop, OutputKind, PlaceMut, Proposal, Situation, Stage,
 };
+use crate::fit::initial_state::settled;
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::fit::preparation::rescale;
 use crate::linear::Sections;
@@ -58,6 +59,9 @@ pub(super) fn forces(
     let dynamics = |own: &Balance| own.dynamics(gain, delay, growth).ok();
     let linear = balance(record, delay, &[], &policy.balance).filter(|_| gain != 0.0);
     let Some(linear) = linear.as_ref().and_then(dynamics) else { return Ok(Vec::new()) };
+    let settle = |point: Point, name: &str, progress: Progress| {
+        settled(point, &state.prepared.record, &state.setup.options, name, progress)
+    };
     let mut found = Vec::new();
     for &entry in state.setup.allowed.iter().filter(|entry| entry.stage == Stage::Dynamics) {
         let is_refused = state.refused.iter().any(|rejected| rejected.effect == entry.name);
@@ -71,7 +75,7 @@ pub(super) fn forces(
             let ends = limits(record, 0, &policy.outside)?;
             if !state.has(entry) && !ends.is_empty() {
                 let point = begin(state, &straight, linear.clone(), None);
-                let point = settled(state, point, entry, progress)?;
+                let point = settle(point, entry.name, progress)?;
                 found.extend(limited(state, &point, ends, entry, progress)?);
             }
             continue;
@@ -81,7 +85,7 @@ pub(super) fn forces(
         let forces: Vec<f64> = own.forces.iter().map(|force| gain * force).collect();
         set_forces(&mut effect, &forces, &dynamics);
         let point = begin(state, &straight, dynamics, Some(effect.clone()));
-        let start = Some(settled(state, point, entry, progress)?);
+        let start = Some(settle(point, entry.name, progress)?);
         let (columns, gain) = (forces.len(), own.explained);
         let score = Score { start: effect, zero: None, gain, columns };
         found.push(Ranked { entry, score, worth: gain, start });
@@ -197,20 +201,6 @@ fn begin(
     let mut point = effects.fold(point, |point, effect| point.with_effect(effect));
     rescale(&mut point);
     point
-}
-
-/// A point with the offsets and initial states that fit best, all else held.
-fn settled(
-    state: &SearchState,
-    point: Point,
-    entry: &Entry,
-    progress: Progress,
-) -> Result<Point, Error> {
-    let mut options = state.setup.options.clone();
-    options.freedom.weights = false;
-    options.freedom.identity = false;
-    options.freedom.dynamics = DynamicsFreedom::Nothing;
-    Ok(state.fit(point, &options, entry.name, progress)?.point)
 }
 
 /// The proposals of an effect for a mass of these dynamics that moves as measured.

@@ -22,7 +22,7 @@ pub(crate) mod gather;
 mod grid;
 mod horizons;
 pub(crate) mod hysteresis;
-mod initial_state;
+pub(crate) mod initial_state;
 pub(crate) mod joint;
 pub(crate) mod line_modes;
 pub(crate) mod memory;

@@ -8,6 +8,7 @@
 //! (`preparation`), fit (`joint`), simplify and report (`finish`).
 
 use crate::chain::hysteresis::Parameters;
+use crate::fit::initial_state::settled_anew;
 use crate::fit::joint::joint;
 use crate::fit::preparation::{Prepared, require_match};
 use crate::fit::refinement::{RefineOptions, Refinement};
@@ -68,6 +69,8 @@ pub fn refine(
     }
     let mut overall = Overall::new(progress, 1.0, 1.0, ProgressSettings::usual()?.last);
     let mut progress = |report: &Report| overall.take(report);
+    // the model's parameters would follow what a wrong initial state leaves
+    let point = settled_anew(point, &prepared, &mut progress)?;
     let refined = joint(point, &prepared, options, f64::INFINITY, false, &mut progress)?;
     let refinement = refined.finish(&prepared, &mut progress)?;
     overall.finish();
