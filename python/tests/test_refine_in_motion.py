@@ -45,7 +45,7 @@ def stage() -> gpi.Model:
 
 
 def test_the_refinement_of_the_truth_is_the_truth(stage: gpi.Model) -> None:
-    """In equilibrium at the first input, the stage is far from where it is."""
+    """The fit of the start begins at the steady state for the first input, which is far away."""
     k = np.arange(12_000)
     u = 8 * np.sin(2 * np.pi * k / 2500) + 2 * np.sign(np.sin(2 * np.pi * k / 1300 + 0.3))
     y = np.ravel(stage.simulate(u))
@@ -54,5 +54,5 @@ def test_the_refinement_of_the_truth_is_the_truth(stage: gpi.Model) -> None:
     y = y + noise * np.random.default_rng(1).standard_normal(len(y))
     record = gpi.Record(u[in_motion], y[in_motion], rate=1000.0)
     refined = gpi.refine(stage, record)
-    assert refined.error(record, fit_start=True)["rms"] < 1.02 * noise  # 29 times before
+    assert refined.error(record, fit_start=True)["rms"] < 1.02 * noise
     np.testing.assert_allclose(np.sort(refined.linear.poles.real), (0.998, 0.99998), atol=2e-6)

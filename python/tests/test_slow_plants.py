@@ -12,7 +12,7 @@ from plants import textbook
 pytestmark = pytest.mark.slow
 
 
-# The first estimate of 1003 has no slow pole; those of the others led to many plays in place of the curve.
+# The first estimate of G for seed 1003 has no slow pole. All seeds once led to plays in place of the curve.
 @pytest.mark.parametrize("seed", [1000, 1002, 1003, 1004])
 def test_a_heater_is_a_curve_before_two_lags(seed: int) -> None:
     run, other = textbook.draw("heater", seed), textbook.draw("heater", seed, 1)
@@ -20,7 +20,7 @@ def test_a_heater_is_a_curve_before_two_lags(seed: int) -> None:
     assert len(model.linear.poles) == 2
     assert model.error(gpi.Record(run.u, run.y, rate=run.rate), fit_start=True)["rms"] < 1.03 * run.noise
     again = model.error(gpi.Record(other.u, other.y, rate=other.rate), fit_start=True)["rms"]
-    assert again < 1.3 * run.noise  # 2.5 to 92 before
+    assert again < 1.3 * run.noise
 
 
 def test_a_force_is_found_where_the_input_is_not_held_between_samples() -> None:
