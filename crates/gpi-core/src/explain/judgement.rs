@@ -12,7 +12,7 @@
 //!    Autocorrelated residuals are worth fewer samples than they have: with a factor kappa, by which the covariance
 //!    of the parameters exceeds that for white noise, the first two terms count kappa times.
 //! 3. *Confirmed*: the squares of the held-out blocks fall, see [`is_confirmed`], and by nearly as large a part as those of
-//!    the training data. A model with fewer unknowns than the present one adds nothing that chance could use: of it, the fall of
+//!    the training data, or by most of the squares of what the effect changes there, see [`is_seen`]. A model with fewer unknowns than the present one adds nothing that chance could use: of it, the fall of
 //!    the sum is enough, if it is substantial.
 //! 4. *Substantial*: far from the noise a bad fit resembles many effects a little, so a large part of the training
 //!    and of the held-out squares must go. This is not asked near the noise, of an effect whose signature no bad fit
@@ -82,6 +82,8 @@ pub(super) struct Evidence<'a> {
     pub noise: f64,
     /// Squares of each held-out block without and with the effect.
     pub held_out: [&'a [f64]; 2],
+    /// Squares of what it changes of the held-out output, where that was computed.
+    pub change: Option<f64>,
     /// Whether the input makes it explain what it does, where it is an effect that the input drives.
     pub is_driven: bool,
     /// Whether the model with it has fewer unknowns than the present one.
@@ -261,11 +263,24 @@ fn explains_as_much(trial: &Evidence, other: &Evidence) -> bool {
     trial.deviance > other.deviance - other.threshold
 }
 
-/// Whether the held-out squares fall by nearly as large a part as the training squares.
+/// Whether the held-out squares fall by nearly as large a part as the training squares, or as they must where the held-out
+/// blocks show less of the effect.
+///
+/// With e the held-out residual of the model with the effect, d what the effect changes of the output, and e + d the
+/// residual without it, an effect that is right leaves e without correlation to d, and the squares fall by
+///
+/// ```text
+/// |e + d|^2 - |e|^2 = |d|^2 + 2 e'd,      close to |d|^2,
+/// ```
+///
+/// however little of it the blocks show. What only fits the training data changes the blocks at random, `e'd` is
+/// near `-|d|^2 / 2` or below, and nothing falls.
 fn is_seen(trial: &Evidence, policy: &JudgementPolicy) -> bool {
     let part = |[before, after]: [f64; 2]| 1.0 - after / before.max(f64::MIN_POSITIVE);
     let held_out = trial.held_out.map(|blocks| blocks.iter().sum());
+    let falls = held_out[0] - held_out[1];
     part(held_out) >= policy.seen * part(trial.squares)
+        || trial.change.is_some_and(|change| falls >= policy.predicted * change)
 }
 
 /// Whether the model of a trial has fewer unknowns, and substantially smaller squares of both kinds.
@@ -340,6 +355,7 @@ mod tests {
             squares: [100.0, 60.0],
             noise: 1.0,
             held_out: [&BEFORE, &AFTER],
+            change: None,
             is_driven: true,
             is_simpler: false,
             is_unique: false,
@@ -375,6 +391,16 @@ mod tests {
         assert_eq!(unsure(false, &UNEVEN), Err(Refusal::Unconfirmed));
         assert_eq!(unsure(true, &UNEVEN), Ok(()));
         assert_eq!(unsure(true, &[1.0, 17.0, 9.0, 8.0]), Err(Refusal::Unconfirmed));
+        // a part of 0.02 in the blocks, of 0.4 in the training data: the blocks may show little of it
+        let little_shown = |change| {
+            judged(|trial| {
+                (trial.held_out, trial.change) = ([&BEFORE, &[9.8, 10.78, 8.82, 9.8]], change);
+                trial.is_unique = true;
+            })
+        };
+        assert_eq!(little_shown(None), Err(Refusal::Unconfirmed));
+        assert_eq!(little_shown(Some(0.9)), Ok(()));
+        assert_eq!(little_shown(Some(1.2)), Err(Refusal::Unconfirmed));
         assert_eq!(judged(|trial| trial.squares[1] = 71.0), Err(Refusal::Insubstantial));
         let little = judged(|trial| trial.held_out = [&BEFORE, &[8.1, 9.0, 7.3, 8.1]]);
         assert_eq!(little, Err(Refusal::Insubstantial));

@@ -123,11 +123,11 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let noise = state.noise_squares()?;
     let balanced: Vec<_> =
         trials.iter().map(|trial| balanced(state, trial)).collect::<Result<_, _>>()?;
-    let mut evidences: Vec<Evidence> = trials
+    let mut evidences = trials
         .iter()
         .zip(&balanced)
         .map(|(trial, balanced)| evidence(state, trial, noise, &before, balanced.as_ref()))
-        .collect();
+        .collect::<Result<Vec<Evidence>, Error>>()?;
     let judgement = &state.setup.policy.judgement;
     let measured = state.setup.policy.examination.measured_instead;
     let mut better: Option<Fitted> = None;
@@ -189,12 +189,14 @@ fn evidence<'a>(
     noise: f64,
     before: &'a [f64],
     balanced: Option<&'a Balanced>,
-) -> Evidence<'a> {
+) -> Result<Evidence<'a>, Error> {
     let is_worse = trial.held_out.iter().sum::<f64>() > before.iter().sum::<f64>();
     let of_output = ([state.cost, trial.cost], [before, &trial.held_out[..]]);
     let (squares, held_out) =
         balanced.map_or(of_output, |own| (own.squares, [&own.held_out[0][..], &own.held_out[1]]));
-    Evidence {
+    let is_asked = balanced.is_none() && trial.deviance > trial.threshold;
+    let change = is_asked.then(|| state.held_out_change(&state.point, &trial.point)).transpose()?;
+    Ok(Evidence {
         deviance: if balanced.is_some() {
             state.prepared.values() * (squares[0] / squares[1]).ln()
         } else {
@@ -204,6 +206,7 @@ fn evidence<'a>(
         squares,
         noise,
         held_out,
+        change,
         is_driven: trial.is_driven,
         is_simpler: state.setup.estimated(&trial.point) < state.setup.estimated(&state.point),
         is_unique: trial.entry.signature == Signature::Unique,
@@ -213,7 +216,7 @@ fn evidence<'a>(
         is_slow: trial.entry.signature == Signature::SlowInTime,
         is_added: trial.entry.stage == Stage::Added,
         doubt: (balanced.is_some() && is_worse).then_some(Refusal::Unconfirmed),
-    }
+    })
 }
 
 /// A candidate whose fit failed.

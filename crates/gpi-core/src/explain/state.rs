@@ -212,6 +212,14 @@ impl<'a> SearchState<'a> {
         self.squares(point, &self.setup.test)
     }
 
+    /// Squares of the difference of two models' outputs in the held-out blocks.
+    pub(super) fn held_out_change(&self, one: &Point, other: &Point) -> Result<f64, Error> {
+        let record = &self.prepared.record;
+        let mut difference = one.residuals(record)?;
+        difference.iter_mut().zip(other.residuals(record)?).for_each(|(own, other)| *own -= other);
+        Ok(self.setup.options.loss.cost(scored(&difference, &self.setup.test)))
+    }
+
     /// Squares of every run that `record` scores.
     fn squares(&self, point: &Point, record: &Record) -> Result<Vec<f64>, Error> {
         // run over the training record, whose initial states were fitted

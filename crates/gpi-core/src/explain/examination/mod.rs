@@ -87,6 +87,7 @@ pub(super) fn examine(
         deviance: trial.deviance.min(state.prepared.values() * (cost / trial.cost).ln()),
         squares: [cost, trial.cost],
         held_out: [&held_out, &trial.held_out],
+        change: Some(state.held_out_change(&without.point, &trial.point)?),
         ..*evidence
     };
     let again = judge(&alone, &state.setup.policy.judgement).err().map(|_| Refusal::LongerFit);
