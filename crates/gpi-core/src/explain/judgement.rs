@@ -394,7 +394,8 @@ mod tests {
         // a part of 0.02 in the blocks, of 0.4 in the training data: the blocks may show little of it
         let little_shown = |change| {
             judged(|trial| {
-                (trial.held_out, trial.change) = ([&BEFORE, &[9.8, 10.78, 8.82, 9.8]], change);
+                trial.held_out = [&BEFORE, &[9.8, 10.78, 8.82, 9.8]];
+                trial.change = change;
                 trial.is_unique = true;
             })
         };

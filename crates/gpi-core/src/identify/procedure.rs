@@ -132,10 +132,10 @@ pub(super) fn compare_elements(
     } else if options.order.is_none() {
         search.shed(progress)?;
     }
-    if options.order.is_none() {
-        let slow = slow_plant::seed(&seed.point, prepared, &settings.slow, progress);
-        if let Some(seed) = Error::unless_interrupted(slow)?.ok().flatten() {
-            search.slow(&seed, progress)?;
+    let slow = slow_plant::seed(&seed.point, options.order, prepared, &settings.slow, progress);
+    if let Some(seed) = Error::unless_interrupted(slow)?.ok().flatten() {
+        search.slow(&seed, progress)?;
+        if options.order.is_none() {
             search.orders(&mut few, settings, progress)?;
         }
     }

@@ -7,8 +7,9 @@
 //! G(z) = D + C_1 (1 - p_1) / (z - p_1) + C_2 (1 - p_2) / (z - p_2),    p_i = exp(-1 / T_i)
 //! ```
 //!
-//! C_1, C_2 and D (outputs, inputs) by least squares on y, with u in place of v. Two lags in a row are such a sum. Of a record of many
-//! stretches of scored samples, the longest ones take part.
+//! C_1, C_2 and D (outputs, inputs) by least squares on y, with u in place of v. Two lags in a row are such a sum. Where an order is
+//! given, there are as many lags as it has for each input, one or two. Of a record of many stretches of scored samples, the longest
+//! ones take part.
 
 use crate::chain::point::Point;
 use crate::fit::memory::Memory;
@@ -20,16 +21,20 @@ use crate::progress::{Progress, report};
 use crate::{Error, Experiment, Matrix, Record};
 use std::cmp::Reverse;
 
-/// The best pair of lags of a plant that is linear otherwise; `None` where the plant is not slow by these lags, or neither a first
-/// estimate of it is slow nor a single lag leaves a smaller error. Where one does, the estimate is wrong.
+/// The best pair of lags of a plant that is linear otherwise, or as many as a given order has; `None` where it has others, where the
+/// plant is not slow by these lags, or where neither a first estimate of it is slow nor a single lag leaves a smaller error. Where
+/// one does, the estimate is wrong.
 pub(super) fn seed(
     estimate: &Point,
+    order: Option<usize>,
     prepared: &Prepared,
     policy: &SlowPolicy,
     progress: Progress,
 ) -> Result<Option<Point>, Error> {
     let memory = Memory::of(&prepared.record);
-    if prepared.record.longest() < memory.enough() {
+    let inputs = prepared.record.inputs().len();
+    let is_pair = order.is_none_or(|order| order == 2 * inputs);
+    if prepared.record.longest() < memory.enough() || !(is_pair || order == Some(inputs)) {
         return Ok(None);
     }
     let is_slow = memory.is_slow_plant(estimate, prepared)?;
@@ -40,11 +45,12 @@ pub(super) fn seed(
             .take_while(|&constant| constant <= longest)
             .collect();
     let record = longest_of(&prepared.record, stretches)?;
+    let singles: Vec<_> = constants.iter().map(|&constant| vec![constant]).collect();
+    let asks_singles = !(is_slow && is_pair);
+    let single = asks_singles.then(|| best_of(&record, &singles, progress)).transpose()?.flatten();
     if !is_slow {
-        let singles: Vec<_> = constants.iter().map(|&constant| vec![constant]).collect();
-        let single = best_of(&record, &singles, progress)?;
         let rms = prepared.free_run(&mut estimate.clone())?;
-        if single.is_none_or(|single| single.rms >= rms) {
+        if single.as_ref().is_none_or(|single| single.rms >= rms) {
             return Ok(None);
         }
     }
@@ -52,7 +58,8 @@ pub(super) fn seed(
         constants[place + 1..].iter().map(|&second| vec![first, second]).collect()
     };
     let pairs: Vec<_> = constants.iter().enumerate().flat_map(with_slower).collect();
-    let Some(best) = best_of(&record, &pairs, progress)? else { return Ok(None) };
+    let best = if is_pair { best_of(&record, &pairs, progress)? } else { single };
+    let Some(best) = best else { return Ok(None) };
     let mut point = prepared.point(Sections::from_state_space(&best.system, 0)?);
     if !memory.is_slow_plant(&point, prepared)? {
         return Ok(None);
@@ -114,7 +121,7 @@ mod tests {
 
     /// The time constants that are found for a stage with so much of its gain at once and two lags in a row, which begins in
     /// motion, with many levels of the input.
-    fn found(at_once: f64, constants: [f64; 2]) -> Option<Vec<f64>> {
+    fn found(at_once: f64, constants: [f64; 2], order: Option<usize>) -> Option<Vec<f64>> {
         let level = |k: usize| ((k / 150) as f64 * 2.399).sin();
         let (mut first, mut second) = (0.3, -0.2);
         let (mut u, mut y) = (Vec::new(), Vec::new());
@@ -137,7 +144,8 @@ mod tests {
         let system = lags(&constants, (1, 1)).unwrap();
         let estimate = refit(&prepared.record, system).unwrap().system;
         let estimate = prepared.point(Sections::from_state_space(&estimate, 0).unwrap());
-        let point = seed(&estimate, &prepared, &SlowPolicy::default(), &mut |_| true).unwrap()?;
+        let point = seed(&estimate, order, &prepared, &SlowPolicy::default(), &mut |_| true);
+        let point = point.unwrap()?;
         let mut constants: Vec<f64> = point.dynamics.poles().iter().map(time_constant).collect();
         constants.sort_by(f64::total_cmp);
         Some(constants)
@@ -145,15 +153,25 @@ mod tests {
 
     #[test]
     fn both_lags_of_a_slow_plant_are_on_the_grid_next_to_the_true_ones() {
-        let constants = found(0.0, [900.0, 300.0]).unwrap();
-        assert_eq!(constants.len(), 2);
-        assert!((200.0..450.0).contains(&constants[0]), "{constants:?}");
-        assert!((600.0..1350.0).contains(&constants[1]), "{constants:?}");
+        for order in [None, Some(2)] {
+            let constants = found(0.0, [900.0, 300.0], order).unwrap();
+            assert_eq!(constants.len(), 2);
+            assert!((200.0..450.0).contains(&constants[0]), "{constants:?}");
+            assert!((600.0..1350.0).contains(&constants[1]), "{constants:?}");
+        }
+    }
+
+    #[test]
+    fn a_given_order_has_as_many_lags() {
+        let constants = found(0.0, [900.0, 1.0], Some(1)).unwrap();
+        assert_eq!(constants.len(), 1);
+        assert!((600.0..1350.0).contains(&constants[0]), "{constants:?}");
+        assert_eq!(found(0.0, [900.0, 300.0], Some(3)), None);
     }
 
     #[test]
     fn a_stage_that_moves_at_once_is_not_a_slow_plant() {
-        assert_eq!(found(0.7, [900.0, 300.0]), None);
-        assert_eq!(found(0.0, [6.0, 3.0]), None);
+        assert_eq!(found(0.7, [900.0, 300.0], None), None);
+        assert_eq!(found(0.0, [6.0, 3.0], None), None);
     }
 }
