@@ -140,7 +140,11 @@ EFFECTS: dict[str, Schema] = {
     "friction": closed({"loops": listed(LOOP)}),
     "saturation": closed({"loops": listed(LOOP)}),
     "output-nonlinearity": closed(
-        {"output": OUTPUT, "coefficients": numbers(), "middle": number(), "scale": size()}
+        {"output": OUTPUT, "coefficients": numbers(), "middle": number(), "scale": size()},
+        {
+            "lowest": number("the lowest reading of a sensor that clips, without the offset"),
+            "highest": number("the highest reading of a sensor that clips, without the offset"),
+        },
     ),
     "gain-drift": closed({"output": OUTPUT, **CHANGES}),
     "backlash": closed(

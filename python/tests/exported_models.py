@@ -108,7 +108,14 @@ EFFECTS: dict[str, dict[str, Any]] = {
             },
         ]
     },
-    "output-nonlinearity": {"output": 0, "coefficients": [0.02, 0.01], "middle": 0.3, "scale": 5.0},
+    "output-nonlinearity": {
+        "output": 0,
+        "coefficients": [0.02, 0.01],
+        "middle": 0.3,
+        "scale": 5.0,
+        "lowest": -3.8,
+        "highest": 4.4,
+    },
     "gain-drift": {"output": 0, "changes": [0.02, 0.01, -0.03], "duration": 2.0},
     "backlash": {"output": 0, "half_width": 0.05},
     "drift": {

@@ -220,8 +220,19 @@ CASES = {
         {"feedback": lambda y: 2 * (DRIVES2 * (y / 2) ** 2 + DRIVES3 * (y / 2) ** 3)},
     ),
     "output-nonlinearity": (
-        {"output": 0, "coefficients": [0.05, -0.03], "middle": 0.4, "scale": 3.0},
-        {"sense": lambda x: x + 3 * (0.05 * ((x - 0.4) / 3) ** 2 - 0.03 * ((x - 0.4) / 3) ** 3)},
+        {
+            "output": 0,
+            "coefficients": [0.05, -0.03],
+            "middle": 0.4,
+            "scale": 3.0,
+            "lowest": -3.5,
+            "highest": 4.0,
+        },
+        {
+            "sense": lambda x: np.clip(
+                x + 3 * (0.05 * ((x - 0.4) / 3) ** 2 - 0.03 * ((x - 0.4) / 3) ** 3), -3.5, 4.0
+            )
+        },
     ),
     "gain-drift": (
         {"output": 0, "changes": [0.1, -0.2], "duration": 0.4},
@@ -363,7 +374,7 @@ OWN_VALUES = {
     "rate-dependence": ["relative", "absolute", "law.exponent", "law.knee", "law.lag"],
     "hysteresis-shape": [f"coefficients.{i}" for i in range(CURVES.size)],
     "stiffness": [f"loops.{i}.drives.{j}" for i in range(2) for j in range(3)],
-    "output-nonlinearity": ["coefficients.0", "coefficients.1"],
+    "output-nonlinearity": ["coefficients.0", "coefficients.1", "lowest", "highest"],
     "gain-drift": ["changes.0", "changes.1"],
     "backlash": ["half_width"],
     "drift": ["changes.0", "changes.1"],

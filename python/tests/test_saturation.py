@@ -1,5 +1,7 @@
 """Limits of states inside the dynamics, against their equations in plain NumPy, and in records of tanks."""
 
+import json
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -107,7 +109,53 @@ def test_a_sensor_that_clips_is_no_saturation() -> None:
     u, y = tanks(3, tops=(9.0, 9.0), sensor=0.62)
     assert np.mean(y == 0.62) > 0.05
     found = gpi.explain(gpi.Record(u, y, rate=1.0))
-    assert found.effects == [], found.effects
+    assert found.effects in ([], ["output-nonlinearity"]), found.effects
+
+
+def clipped(drive: np.ndarray, lowest: float, highest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Simulate three plays before a lag, and a sensor that ends; return the reading and the displacement."""
+    v = np.zeros_like(drive)
+    for half_width, weight in ((0.0, 0.6), (0.8, 0.3), (1.7, 0.2)):
+        play = 0.0
+        for k, u in enumerate(drive):
+            play = max(u - half_width, min(u + half_width, play))
+            v[k] += weight * play
+    x = np.zeros_like(v)
+    for k in range(1, len(v)):
+        x[k] = 0.8 * x[k - 1] + 0.2 * v[k - 1]
+    noise = 0.003 * np.random.default_rng(5).standard_normal(len(x))
+    return np.clip(x + noise, lowest, highest), x
+
+
+def test_a_sensor_that_clips_is_named_and_the_stage_behind_it_is_found() -> None:
+    k = np.arange(6000)
+    drive = 3.0 * np.sin(0.011 * k) + 1.5 * np.sin(0.031 * k + 1.0) + 0.6 * np.sin(0.17 * k)
+    # the upper end is reached often, the lower one hardly
+    y, x = clipped(drive, -3.9, 2.6)
+    assert np.mean(y == 2.6) > 0.02
+    found = gpi.explain(gpi.Record(drive, y, rate=100.0))
+    assert found.effects == ["output-nonlinearity"]
+    assert found.verdict == "explained"
+    assert found.after["holdout"]["rms"] < 0.0035
+    (sensor,) = json.loads(found.model.to_json())["effects"]
+    offset = found.model.offsets[0]
+    assert sensor["highest"] + offset == pytest.approx(2.6, abs=0.005)
+    assert sensor["coefficients"] == []
+    # a model without the sensor's range shows where the stage was, which the record does not
+    beyond = json.loads(found.model.to_json())
+    beyond["effects"] = []
+    for estimated in ("estimates", "prediction"):
+        beyond.pop(estimated, None)
+    stage = gpi.Model.from_json(json.dumps(beyond)).simulate(drive)
+    assert np.max(x) > 3.0
+    assert np.max(np.abs(np.ravel(stage)[500:] - x[500:])) < 0.05
+    # what the sensor cannot show is no reference, and what it can show is reached
+    slow = np.sin(0.01 * k[:1000])
+    with pytest.raises(gpi.ParameterError, match=r"`reference` = .* reads -3\.[89]\d* to 2\.[56]\d* only"):
+        found.model.compensate(3.0 * slow)
+    assert found.model.compensate(2.0 * slow).error["rms"] < 1e-9
+    # the reading that the model shows ends where the sensor's does
+    assert np.max(found.model.simulate(drive)) == pytest.approx(2.6, abs=0.005)
 
 
 @pytest.mark.slow

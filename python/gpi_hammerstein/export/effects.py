@@ -173,10 +173,16 @@ def _loop(inner: Parameters, around: Around) -> Operation:
 
 
 def output_nonlinearity(own: Parameters, around: Around) -> list[Operation]:
-    """(E8): a polynomial of the displacement."""
-    numbers = {"middle": own["middle"], "scale": own["scale"]}
-    arrays = {"coefficients": np.array(own["coefficients"], dtype=np.float64)}
-    return [Operation("polynomial", "output", own["output"], numbers, arrays)]
+    """(E8): a polynomial of the displacement, within the range of the sensor."""
+    operations = []
+    if own["coefficients"]:
+        numbers = {"middle": own["middle"], "scale": own["scale"]}
+        arrays = {"coefficients": np.array(own["coefficients"], dtype=np.float64)}
+        operations.append(Operation("polynomial", "output", own["output"], numbers, arrays))
+    for end, kind in (("lowest", "no_less"), ("highest", "no_more")):
+        if own.get(end) is not None:
+            operations.append(Operation(kind, "output", own["output"], {end: own[end]}))
+    return operations
 
 
 def gain_drift(own: Parameters, around: Around) -> list[Operation]:

@@ -80,8 +80,15 @@ pub(crate) fn model() -> Model {
     let effects: [Effect; 3] = [
         stiffness().into(),
         Backlash { output: 1, half_width: 0.2, missing: None }.into(),
-        OutputNonlinearity { output: 1, coefficients: vec![0.1, -0.05], middle: 0.1, scale: 3.0 }
-            .into(),
+        OutputNonlinearity {
+            output: 1,
+            coefficients: vec![0.1, -0.05],
+            middle: 0.1,
+            scale: 3.0,
+            lowest: Some(-2.0),
+            highest: None,
+        }
+        .into(),
     ];
     Model::new(100.0, u, y, hysteresis.collect(), linear.unwrap(), vec![0.0; 2])
         .and_then(|model| model.with_effects(effects.to_vec()))

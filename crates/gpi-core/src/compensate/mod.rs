@@ -58,8 +58,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// The reference has another number of channels than the model or is not finite, the numbers of inputs and outputs
-    /// differ, the limits leave no interval, or the hysteresis or the dynamics have no inverse.
+    /// The reference has another number of channels than the model, is not finite or beyond the range of a sensor that clips, the
+    /// numbers of inputs and outputs differ, the limits leave no interval, or the hysteresis or the dynamics have no inverse.
     pub fn compensate(
         &self,
         reference: &Matrix,
@@ -182,7 +182,8 @@ impl Model {
         Error::require_equal("outputs", columns, ("model", outputs))?;
         Error::require_equal("channels", ("the model's inputs", inputs), ("its outputs", outputs))?;
         Error::require_samples(reference.nrows(), 1, "a reference")?;
-        require_finite(reference, self.outputs())
+        require_finite(reference, self.outputs())?;
+        output::require_in_range(self, reference)
     }
 
     /// The limits of each input's drive.

@@ -2,7 +2,7 @@
 
 use super::solve::zero_of;
 use crate::effects::{Moment, OutputStage};
-use crate::{Matrix, Model};
+use crate::{Error, Matrix, Model};
 
 /// First step of the search for a sample's displacement, as a fraction of the largest signal: about the change between
 /// samples of a slow reference.
@@ -21,6 +21,25 @@ pub(super) fn before_sensor(model: &Model, shown: &Matrix) -> Matrix {
     displacement
 }
 
+/// Every value of a reference must be one that the sensors can show.
+pub(super) fn require_in_range(model: &Model, reference: &Matrix) -> Result<(), Error> {
+    for effect in model.effects().iter().filter_map(|effect| effect.place().output_stage()) {
+        let output = effect.output();
+        let offset = model.offsets()[output];
+        let [lowest, highest] = effect.range().map(|end| end + offset);
+        let is_beyond = |value: &&f64| !(lowest..=highest).contains(*value);
+        if let Some(value) = reference.column(output).iter().find(is_beyond) {
+            let requirement = format!(
+                "the sensor of {} reads {lowest} to {highest} only; let the reference stay within, or take \
+                 output-nonlinearity out of the model",
+                model.outputs()[output].name
+            );
+            return Err(Error::parameter("reference", value, requirement));
+        }
+    }
+    Ok(())
+}
+
 /// Inverts one effect sample by sample; the search for each sample starts at the previous one.
 fn undo(effect: &dyn OutputStage, signal: &mut [f64], rate: f64) {
     const ALL: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
@@ -28,7 +47,8 @@ fn undo(effect: &dyn OutputStage, signal: &mut [f64], rate: f64) {
     let moment = |k: usize| Moment { time: k as f64 / rate, rate, covariates: &[] };
     let (mut before, mut memory) = (signal[0], None::<Vec<f64>>);
     for (k, value) in signal.iter_mut().enumerate() {
-        let wanted = *value;
+        let [lowest, highest] = effect.range();
+        let wanted = value.clamp(lowest, highest);
         let show = |x: f64| {
             let mut own = memory.clone().unwrap_or_else(|| effect.rest(x));
             (effect.sense(&mut own, x, moment(k)).0, own)

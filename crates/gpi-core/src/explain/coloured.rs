@@ -34,7 +34,7 @@ use crate::fit::joint::balance;
 use crate::fit::problem::residual_rms;
 use crate::identify::{NoiseFloor, NoiseMethod};
 use crate::optimize::{Autoregression, Loss};
-use crate::progress::Progress;
+use crate::progress::{Progress, Report};
 use std::cell::OnceCell;
 
 /// Goes on with the search where the noise has a memory, for as many rounds as there are places for their setups.
@@ -92,8 +92,10 @@ fn searched<'a>(
     progress: Progress,
 ) -> Result<SearchState<'a>, Error> {
     let mut next = before.under(setup)?;
-    run(&mut next, progress)?;
-    let (fitted, _) = refined(&next, false, progress)?;
+    // errors of this search are those of the innovations, which are smaller than the errors of the model
+    let mut progress = |report: &Report| progress(&Report { error: None, ..*report });
+    run(&mut next, &mut progress)?;
+    let (fitted, _) = refined(&next, false, &mut progress)?;
     (next.point, next.cost) = (fitted.point, fitted.linearization.cost);
     Ok(next)
 }

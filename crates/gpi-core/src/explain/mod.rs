@@ -5,7 +5,8 @@
 //! 2. Every candidate of the catalogue is ranked by a score test (`score`): the change of the output by the effect,
 //!    projected off the model's own sensitivities (`projection`), explains a part of the residual.
 //!    Of a record with one input and one output that is far from the noise, the balance of forces of a mass (`force_balance`) proposes forces
-//!    inside the mechanics as well, and the models at which their fits begin (`forces`).
+//!    inside the mechanics as well, and the models at which their fits begin (`forces`). Where the output stands at a limit, the model of a
+//!    sensor that clips is a candidate (`sensor_range`).
 //! 3. The best few are fitted jointly with the whole model (`trial`). The one that explains most is accepted if it is
 //!    significant and the held-out blocks confirm it (`judgement`), and if what it does is its own
 //!    (`examination`). Effects that it makes superfluous are dropped (`revision`).
@@ -14,7 +15,7 @@
 //!    much (`force_at_input`), and the residual is tested for remaining structure (`residual`).
 //!
 //! The files import in one direction only: `policy` (every tolerance), `judgement`, `base`, `projection`,
-//! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `trial`,
+//! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `sensor_range`, `trial`,
 //! `examination`, `grid`, `revision`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
 
 pub(crate) mod base;
@@ -43,6 +44,7 @@ mod residual;
 mod revision;
 mod score;
 mod search;
+mod sensor_range;
 mod setup;
 mod slip;
 mod state;
@@ -129,6 +131,13 @@ pub fn explain(
     let mut progress = |report: &Report| overall.take(report);
     let mut refined = compare(&mut prepared, &identify, Some(quick), &mut progress)?.refined;
     refined.drop_undetermined(&prepared, &mut progress)?;
+    let clipping = sensor_range::clipping(
+        &training,
+        &prepared.means,
+        (&identify, quick),
+        &policy.outside,
+        &mut progress,
+    )?;
     let order_is_given = identify.order.is_some() || identify.delay.is_some();
     // none at all is a grid too
     let given = |grid: &Option<Grid>| matches!(grid, Some(Grid::Values(_) | Grid::Count(0)));
@@ -142,6 +151,7 @@ pub fn explain(
     let weights = &refined.options.loss.scales;
     let setup =
         SearchSetup::new(&prepared, weights, measured, allowed, order_is_given, moving, policy)?;
+    let setup = SearchSetup { clipping, ..setup };
     let weighed = vec![OnceCell::new(); setup.policy.noise.rounds];
     let mut state = SearchState::new(&setup, prepared, &refined);
     state.repair()?;

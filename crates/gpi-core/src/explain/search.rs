@@ -11,6 +11,7 @@ use super::ranking::{ranked, scored_beside};
 use super::revision::{
     drop_superfluous, rearrange, settle_lags, shed_lags, shed_lines, shed_sections, straighten,
 };
+use super::sensor_range;
 use super::state::{Addition, Rejected, SearchState, Trial};
 use super::steps::finer_steps;
 use super::trial::{join_modes, trial, trials as trials_of};
@@ -107,6 +108,7 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     }
     best.truncate(state.setup.policy.ranking.fitted);
     best.extend(forces);
+    best.extend(sensor_range::candidate(state)?);
     let (mut trials, mut failed) = (Vec::new(), Vec::new());
     for tried in trials_of(state, best, progress)? {
         tried.map_or_else(|one| failed.push(one), |trial| trials.push(trial));

@@ -32,6 +32,8 @@ pub(super) struct SearchSetup {
     pub order_is_given: bool,
     /// Whether the record is one cycle that repeats.
     pub is_one_sine: bool,
+    /// The declared model with the range of a sensor that clips, where the output stands at a limit.
+    pub clipping: Option<Point>,
     /// The tolerances.
     pub policy: SearchPolicy,
 }
@@ -61,6 +63,7 @@ impl SearchSetup {
             allowed,
             order_is_given,
             is_one_sine: is_one_sine(&prepared.record),
+            clipping: None,
             policy,
         })
     }

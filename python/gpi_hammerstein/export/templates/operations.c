@@ -373,6 +373,20 @@ static real polynomial(real y, real middle, real scale, const real *coefficients
 }
 
 @end
+@no_less
+static real no_less(real y, real lowest)
+{
+    return y < lowest ? lowest : y;
+}
+
+@end
+@no_more
+static real no_more(real y, real highest)
+{
+    return y > highest ? highest : y;
+}
+
+@end
 @scaled|at_knots
 /* A function of time that is zero at the start: the cubic of Catmull and Rom through its later knots. */
 static real at_knots(real pace, const real *later, int last, unsigned long sample)

@@ -312,6 +312,18 @@ fn polynomial(y: Real, middle: Real, scale: Real, coefficients: &[Real]) -> Real
     y + scale * x * x * sum
 }
 @end
+@no_less
+
+fn no_less(y: Real, lowest: Real) -> Real {
+    y.max(lowest)
+}
+@end
+@no_more
+
+fn no_more(y: Real, highest: Real) -> Real {
+    y.min(highest)
+}
+@end
 @scaled|at_knots
 
 /// A function of time that is zero at the start: the cubic of Catmull and Rom through its later knots.

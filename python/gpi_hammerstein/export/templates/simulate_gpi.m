@@ -345,6 +345,10 @@ function y = reading(own, y, covariates)
             for m = 1:numel(own.coefficients)
                 y = y + own.scale * own.coefficients(m) * x .^ (m + 1);
             end
+        case 'no_less'
+            y = max(y, own.lowest);
+        case 'no_more'
+            y = min(y, own.highest);
         case 'scaled'
             y = y .* (1 + at_knots(own, k));
         case 'backlash'

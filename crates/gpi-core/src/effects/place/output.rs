@@ -40,6 +40,11 @@ pub trait OutputStage: Block + Sync {
     fn is_pinched(&self) -> bool {
         false
     }
+
+    /// The lowest and the highest reading. At an end of its range, a sensor says nothing of the displacement.
+    fn range(&self) -> [f64; 2] {
+        [f64::NEG_INFINITY, f64::INFINITY]
+    }
 }
 
 /// A signal that does not depend on the input.

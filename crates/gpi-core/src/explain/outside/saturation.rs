@@ -2,7 +2,8 @@
 //!
 //! A sensor or a drive at its limit repeats one value exactly while the input moves on. A sample is clipped if it stands at
 //! the output's largest or smallest value, in a run of equal samples during which an input moves. A quantized signal also has
-//! runs at its turning points. It stands as often at the next level, and a limit does not.
+//! runs at its turning points. It stands as often at the next level, and a limit does not. Where one end of the range is reached often,
+//! fewer samples show the other.
 
 use crate::explain::policy::OutsidePolicy;
 use crate::{Experiment, Matrix, Record};
@@ -32,8 +33,7 @@ impl Clipped {
 pub(super) fn clipped(record: &Record, output: usize, policy: &OutsidePolicy) -> Clipped {
     let samples = record.samples();
     let none = || vec![Vec::new(); record.experiments().len()];
-    let mut found = Clipped { runs: none(), samples, at: [false; 2] };
-    for (end, sign) in [1.0, -1.0].into_iter().enumerate() {
+    let ends = [1.0, -1.0].map(|sign| {
         let values = || {
             record
                 .experiments()
@@ -44,19 +44,21 @@ pub(super) fn clipped(record: &Record, output: usize, policy: &OutsidePolicy) ->
         let below = values().map(|y| sign * y).filter(|y| *y < extreme);
         let next = below.fold(f64::NEG_INFINITY, f64::max);
         let at_next = values().filter(|y| sign * y == next).count();
-        let mut own = Clipped { runs: none(), samples, at: [false; 2] };
+        let mut own = Clipped { runs: none(), samples, at: [sign > 0.0, sign < 0.0] };
         for (experiment, runs) in record.experiments().iter().zip(&mut own.runs) {
             let stands = |k: usize| sign * experiment.output[(k, output)] == extreme;
             *runs = runs_of(experiment.input.nrows(), stands);
             runs.retain(|run| run.len() >= policy.run && moves(experiment, run) > policy.moved);
         }
-        let is_limit = own.count() as f64 > policy.crowded * at_next as f64;
-        if is_limit && own.share() > policy.clipped {
-            found.at[end] = true;
-            for (all, own) in found.runs.iter_mut().zip(own.runs) {
-                all.extend(own);
-            }
-        }
+        (own.count() as f64 > policy.crowded * at_next as f64).then_some(own)
+    });
+    let mut found = Clipped { runs: none(), samples, at: [false; 2] };
+    if !ends.iter().flatten().any(|own| own.share() > policy.clipped) {
+        return found;
+    }
+    for own in ends.into_iter().flatten() {
+        found.at.iter_mut().zip(own.at).for_each(|(all, own)| *all |= own);
+        found.runs.iter_mut().zip(own.runs).for_each(|(all, own)| all.extend(own));
     }
     found
 }
@@ -116,6 +118,17 @@ mod tests {
         let expected = limited.iter().filter(|y| **y == 0.7 || **y == -0.8).count() as f64;
         let found = share(&u, &limited);
         assert!(found > 0.01 && found <= expected / 6000.0, "{found}");
+        // few samples at one end, where the other one is a limit
+        let mut sorted = smooth.clone();
+        sorted.sort_by(f64::total_cmp);
+        let low = sorted[20];
+        let few: Vec<f64> = smooth.iter().map(|y| y.max(low)).collect();
+        assert_eq!(share(&u, &few), 0.0);
+        let both: Vec<f64> = few.iter().map(|y| y.min(0.7)).collect();
+        let found = clipped(&stage(&u, &both), 0, &OutsidePolicy::default());
+        assert_eq!(found.at, [true; 2]);
+        let is_lowest = |run: &Range<usize>| both[run.start] == low;
+        assert!(found.runs[0].iter().any(is_lowest) && !found.runs[0].iter().all(is_lowest));
         let quantized: Vec<f64> = u.iter().map(|u| (8.0 * u).round() / 8.0).collect();
         assert_eq!(share(&u, &quantized), 0.0);
         // the smallest value only while the input rests

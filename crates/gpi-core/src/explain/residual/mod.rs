@@ -34,6 +34,8 @@ mod simulated;
 mod whiteness;
 mod wrong_samples;
 
+use super::outside::within_limits;
+use super::policy::OutsidePolicy;
 use crate::fit::preparation::require_match;
 use crate::identify::{Progress, residuals_from_fitted_start};
 use crate::{Error, Matrix, Model, Record};
@@ -110,7 +112,7 @@ pub fn residual_tests(
     tests_of(model, record, &residuals)
 }
 
-/// All tests of residuals that a model leaves.
+/// All tests of residuals that a model leaves. Those of a sensor that clips are zero at the ends of its range, where they say nothing.
 pub(crate) fn tests_of(
     model: &Model,
     record: &Record,
@@ -126,6 +128,10 @@ pub(crate) fn tests_of(
     let policy = &ResidualPolicy::default();
     policy.validate()?;
     let (simulated, intermediate) = (&simulated, &intermediate);
+    let mut sensors = model.effects().iter().filter_map(|effect| effect.place().output_stage());
+    let clips = sensors.any(|sensor| sensor.range().iter().any(|end| end.is_finite()));
+    let within = clips.then(|| within_limits(record, &OutsidePolicy::default())).transpose()?;
+    let record = within.as_ref().unwrap_or(record);
     Ok(analyse(&Compared { policy, record, residuals, simulated, intermediate }))
 }
 

@@ -1,0 +1,86 @@
+//! The declared model of a stage whose sensor clips.
+//!
+//! A sensor at the end of its range repeats one value while the stage moves on. Plays and deadzones bend to follow that, and no small
+//! step leads from there to the stage. The declared model is therefore identified once more, with the samples at which the output stands at
+//! a limit left out, and the range of the sensor is added to it: a fit to all samples begins there. Where the model reaches beyond the
+//! range, it agrees with such a sample; where it does not, it errs.
+
+use super::outside::{limits, within_limits};
+use super::policy::OutsidePolicy;
+use super::ranking::Ranked;
+use super::score::Score;
+use super::state::SearchState;
+use crate::chain::point::Point;
+use crate::effects::OutputNonlinearity;
+use crate::identify::long_record::compare;
+use crate::identify::procedure::prepare;
+use crate::identify::{IdentifyOptions, Quick};
+use crate::progress::Progress;
+use crate::{Error, Record};
+
+/// The declared model of a record of one output, of which a part stands at a limit, with the sensor's range; `None` of other records,
+/// and where the rest of the samples shows no model. The outputs of the model are without `means`, those of the record are not.
+pub(super) fn clipping(
+    record: &Record,
+    means: &[f64],
+    options: (&IdentifyOptions, Quick),
+    policy: &OutsidePolicy,
+    progress: Progress,
+) -> Result<Option<Point>, Error> {
+    let ends = limits(record, 0, policy)?;
+    if ends.is_empty() || record.outputs().len() > 1 {
+        return Ok(None);
+    }
+    let found = identified(record, options, policy, progress);
+    let Ok((mut point, mean)) = Error::unless_interrupted(found)? else { return Ok(None) };
+    for offsets in &mut point.offsets {
+        offsets.add_scalar_mut(mean - means[0]);
+    }
+    let zero = means[0] + point.offsets[0][(0, 0)];
+    let end = |of_lowest: bool| {
+        let mut own = ends.iter().filter(|(_, is_lowest)| *is_lowest == of_lowest);
+        own.next().map(|(value, _)| value - zero)
+    };
+    let outputs = || record.experiments().iter().map(|run| run.output.column(0));
+    let highest = outputs().map(|column| column.max()).fold(f64::NEG_INFINITY, f64::max) - zero;
+    let lowest = outputs().map(|column| column.min()).fold(f64::INFINITY, f64::min) - zero;
+    let range = OutputNonlinearity {
+        output: 0,
+        coefficients: Vec::new(),
+        middle: 0.5 * (lowest + highest),
+        scale: 0.5 * (highest - lowest),
+        lowest: end(true),
+        highest: end(false),
+    };
+    Ok(Some(point.with_effect(range.into())))
+}
+
+/// The declared model of the samples within the limits, and the mean of the output that it is without.
+fn identified(
+    record: &Record,
+    (options, quick): (&IdentifyOptions, Quick),
+    policy: &OutsidePolicy,
+    progress: Progress,
+) -> Result<(Point, f64), Error> {
+    let within = within_limits(record, policy)?;
+    let mut prepared = prepare(&within, options)?;
+    let mut refined = compare(&mut prepared, options, Some(quick), progress)?.refined;
+    refined.drop_undetermined(&prepared, progress)?;
+    Ok((refined.fitted.point, prepared.means[0]))
+}
+
+/// The model of a sensor that clips as a candidate; `None` where there is none, or the present model has effects already.
+pub(super) fn candidate(state: &SearchState) -> Result<Option<Ranked>, Error> {
+    let Some(start) = state.setup.clipping.as_ref() else { return Ok(None) };
+    let Some(effect) = start.effects.last() else { return Ok(None) };
+    let entry = effect.entry();
+    let is_allowed = state.setup.allowed.iter().any(|allowed| allowed.name == entry.name);
+    let is_refused = state.refused.iter().any(|rejected| rejected.effect == entry.name);
+    if !is_allowed || is_refused || !state.point.effects.is_empty() {
+        return Ok(None);
+    }
+    let gain = 1.0 - state.training_squares(start)? / state.cost;
+    let columns = effect.values().len();
+    let score = Score { start: effect.clone(), zero: None, gain, columns };
+    Ok(Some(Ranked { entry, score, worth: gain, start: Some(start.clone()) }))
+}
