@@ -12,7 +12,7 @@
 //!    Autocorrelated residuals are worth fewer samples than they have: with a factor kappa, by which the covariance
 //!    of the parameters exceeds that for white noise, the first two terms count kappa times.
 //! 3. *Confirmed*: the squares of the held-out blocks fall, see [`is_confirmed`], and by nearly as large a part as those of
-//!    the training data, or by most of the squares of what the effect changes there, see [`is_predicted`]. A model with fewer unknowns than the present one adds nothing that chance could use: of it, the fall of
+//!    the training data, or by most of the squares of what the effect changes there, see [`is_seen`]. A model with fewer unknowns than the present one adds nothing that chance could use: of it, the fall of
 //!    the sum is enough, if it is substantial.
 //! 4. *Substantial*: far from the noise a bad fit resembles many effects a little, so a large part of the training
 //!    and of the held-out squares must go. This is not asked near the noise, of an effect whose signature no bad fit
@@ -205,8 +205,7 @@ pub(super) fn judge(trial: &Evidence, policy: &JudgementPolicy) -> Result<(), Re
         Err(Refusal::Undriven)
     } else if trial.deviance <= trial.threshold {
         Err(Refusal::Insignificant)
-    } else if !(is_confirmed(trial.held_out, is_predicted(trial, policy), policy)
-        || is_better_and_simpler(trial, policy))
+    } else if !(is_confirmed(trial.held_out, policy) || is_better_and_simpler(trial, policy))
         || !is_seen(trial, policy)
     {
         Err(Refusal::Unconfirmed)
@@ -266,13 +265,6 @@ fn explains_as_much(trial: &Evidence, other: &Evidence) -> bool {
 
 /// Whether the held-out squares fall by nearly as large a part as the training squares, or as they must where the held-out
 /// blocks show less of the effect.
-fn is_seen(trial: &Evidence, policy: &JudgementPolicy) -> bool {
-    let part = |[before, after]: [f64; 2]| 1.0 - after / before.max(f64::MIN_POSITIVE);
-    let held_out = trial.held_out.map(|blocks| blocks.iter().sum());
-    part(held_out) >= policy.seen * part(trial.squares) || is_predicted(trial, policy)
-}
-
-/// Whether the held-out squares fall by nearly the squares of what the effect changes there.
 ///
 /// With e the held-out residual of the model with the effect, d what the effect changes of the output, and e + d the
 /// residual without it, an effect that is right leaves e without correlation to d, and the squares fall by
@@ -283,9 +275,12 @@ fn is_seen(trial: &Evidence, policy: &JudgementPolicy) -> bool {
 ///
 /// however little of it the blocks show. What only fits the training data changes the blocks at random: d has no correlation to
 /// the residual e + d, and the squares grow by `|d|^2`.
-fn is_predicted(trial: &Evidence, policy: &JudgementPolicy) -> bool {
-    let [before, after] = trial.held_out.map(|blocks| blocks.iter().sum::<f64>());
-    trial.change.is_some_and(|change| before - after >= policy.predicted * change)
+fn is_seen(trial: &Evidence, policy: &JudgementPolicy) -> bool {
+    let part = |[before, after]: [f64; 2]| 1.0 - after / before.max(f64::MIN_POSITIVE);
+    let held_out = trial.held_out.map(|blocks| blocks.iter().sum());
+    let falls = held_out[0] - held_out[1];
+    part(held_out) >= policy.seen * part(trial.squares)
+        || trial.change.is_some_and(|change| falls >= policy.predicted * change)
 }
 
 /// Whether the model of a trial has fewer unknowns, and substantially smaller squares of both kinds.
@@ -319,13 +314,8 @@ fn is_weighty(trial: &Evidence, policy: &JudgementPolicy) -> bool {
 /// mean d > z sqrt(var d / n)   or   sum of d_b > 0 exceeds a factor times -(sum of d_b < 0)
 /// ```
 ///
-/// must hold, where var d divides by n - 1. It is the paired t-test of two models on the same blocks. z is smaller where the sum
-/// falls as predicted, see [`is_predicted`]: that is evidence by itself, and one block with another disturbance does not outweigh it.
-fn is_confirmed(
-    [before, after]: [&[f64]; 2],
-    is_predicted: bool,
-    policy: &JudgementPolicy,
-) -> bool {
+/// must hold, where var d divides by n - 1. It is the paired t-test of two models on the same blocks.
+pub(super) fn is_confirmed([before, after]: [&[f64]; 2], policy: &JudgementPolicy) -> bool {
     let differences: Vec<f64> = before.iter().zip(after).map(|(a, b)| a - b).collect();
     let n = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / n;
@@ -334,9 +324,7 @@ fn is_confirmed(
     let gained: f64 = differences.iter().filter(|d| **d > 0.0).sum();
     let lost: f64 = -differences.iter().filter(|d| **d < 0.0).sum::<f64>();
     let one_sided = gained > policy.one_sided * lost;
-    let least =
-        if is_predicted { policy.standard_errors_predicted } else { policy.standard_errors };
-    let is_sure = one_sided || mean > least * (variance / n).sqrt();
+    let is_sure = one_sided || mean > policy.standard_errors * (variance / n).sqrt();
     mean * n > policy.confirmed * total && is_sure
 }
 
@@ -469,13 +457,7 @@ mod tests {
     #[test]
     fn blocks_confirm_by_their_mean_or_by_being_one_sided() {
         let policy = JudgementPolicy::default();
-        let with = |is_predicted, after: [f64; 4]| {
-            is_confirmed([&[10.0; 4], &after], is_predicted, &policy)
-        };
-        let confirmed = |after| with(false, after);
-        // 1.3 standard errors
-        assert!(!confirmed([8.0, 10.9, 8.6, 9.2]) && with(true, [8.0, 10.9, 8.6, 9.2]));
-        assert!(!with(true, [7.0, 12.5, 9.5, 10.0]));
+        let confirmed = |after: [f64; 4]| is_confirmed([&[10.0; 4], &after], &policy);
         assert!(confirmed([9.0, 9.1, 8.9, 9.0]));
         // all in one block, hardly worse in the others
         assert!(confirmed([4.0, 10.1, 10.1, 10.1]));
@@ -483,7 +465,7 @@ mod tests {
         // sure, and of no use
         assert!(!confirmed([9.96; 4]));
         assert!(!confirmed([10.5; 4]));
-        assert!(!is_confirmed([&[], &[]], true, &policy));
+        assert!(!is_confirmed([&[], &[]], &policy));
     }
 
     #[test]

@@ -230,8 +230,6 @@ settings! {
         predicted: f64 = 0.7, PART;
         /// Standard errors of the mean difference between blocks: one-sided, 5 % for a normal number.
         standard_errors: f64 = 1.7, 0.0..=100.0;
-        /// The same where the held-out squares fall as predicted: 16 %. By hand.
-        standard_errors_predicted: f64 = 1.0, 0.0..=100.0;
         /// Part of the deviance of another function of time that one which is added to the output must reach to be preferred,
         /// because it assumes less. By hand.
         tied: f64 = 0.99, PART;
