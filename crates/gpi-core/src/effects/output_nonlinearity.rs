@@ -157,7 +157,7 @@ mod tests {
         assert_eq!(read(&sensor, -9.0), -3.0);
         assert_eq!(sensor.values(), [0.1, -3.0]);
         sensor.highest = Some(4.0);
-        sensor.set(&[0.2, -2.0, 5.0]);
+        sensor.set(&[0.05, -2.0, 5.0]);
         assert_eq!((sensor.lowest, sensor.highest), (Some(-2.0), Some(5.0)));
         assert_eq!([read(&sensor, 9.0), read(&sensor, -9.0)], [5.0, -2.0]);
         assert_eq!(sensor.flaw(), None);

@@ -226,7 +226,7 @@ settings! {
         /// that it takes of the training data, which varies with the blocks. By hand.
         seen: f64 = 0.2, PART;
         /// Or the part of the squares of what it changes in the held-out data by which their squares fall: 1 if it is right,
-        /// 0.6 to 1.1 of right effects near the noise, below 0.3 of wrong ones. By hand.
+        /// 0.6 to 1.1 of right effects near the noise, below 0.5 of wrong ones. By hand.
         predicted: f64 = 0.7, PART;
         /// Standard errors of the mean difference between blocks: one-sided, 5 % for a normal number.
         standard_errors: f64 = 1.7, 0.0..=100.0;
