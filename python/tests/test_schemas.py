@@ -132,7 +132,7 @@ CHANGES: list[Callable[[Any, tuple[Any, ...]], None]] = [without, of_another_typ
 #: Members that a file may have or not.
 OPTIONAL = {"files", "experiments", "notes", "holdout", "rule", "effects", "estimates", "prediction", "unit"}
 OPTIONAL |= {"undetermined", "moves_stage", "law", "picture", "period", "samples", "start"}
-OPTIONAL |= {"lowest", "highest"}
+OPTIONAL |= {"lowest", "highest", "range"}
 
 
 @pytest.mark.parametrize(
