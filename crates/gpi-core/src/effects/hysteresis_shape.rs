@@ -40,6 +40,19 @@ pub struct HysteresisShape {
 /// The largest A and B.
 const MOST: usize = 10;
 
+/// The factors of `P_(n+1) = (2 n + 1) / (n + 1) x P_n - n / (n + 1) P_(n-1)`: the polynomials are asked for at every sample of every
+/// play, and divisions would take most of the time.
+const RECURSION: [[f64; 2]; MOST + 1] = {
+    let mut factors = [[0.0; 2]; MOST + 1];
+    let mut n = 0;
+    while n <= MOST {
+        let m = n as f64;
+        factors[n] = [(2.0 * m + 1.0) / (m + 1.0), m / (m + 1.0)];
+        n += 1;
+    }
+    factors
+};
+
 impl HysteresisShape {
     pub(super) const NAME: &'static str = "hysteresis-shape";
     pub(super) const WHAT: &'static str =
@@ -75,19 +88,24 @@ impl HysteresisShape {
         proposals
     }
 
-    /// The Legendre polynomials P_0, P_1, ..
-    fn legendre(x: f64) -> [f64; MOST + 2] {
+    /// A, the number of polynomials of the place.
+    fn degrees(&self) -> usize {
+        self.coefficients.len() / self.widths
+    }
+
+    /// The Legendre polynomials P_0, P_1, .. P_degree; those above it stay 1.
+    fn legendre(x: f64, degree: usize) -> [f64; MOST + 2] {
         let mut values = [1.0; MOST + 2];
         values[1] = x;
-        for n in 1..=MOST {
-            let m = n as f64;
-            values[n + 1] = ((2.0 * m + 1.0) * x * values[n] - m * values[n - 1]) / (m + 1.0);
+        for n in 1..degree {
+            let [own, before] = RECURSION[n];
+            values[n + 1] = own * x * values[n] - before * values[n - 1];
         }
         values
     }
 
     fn by_width(&self, half_width: f64) -> [f64; MOST + 2] {
-        Self::legendre((2.0 * half_width / self.widest - 1.0).clamp(-1.0, 1.0))
+        Self::legendre((2.0 * half_width / self.widest - 1.0).clamp(-1.0, 1.0), self.widths - 1)
     }
 
     /// Derivatives by the half-width of the polynomials `by_width`: `P_(n+1)' = P_(n-1)' + (2 n + 1) P_n`.
@@ -95,7 +113,7 @@ impl HysteresisShape {
         let mut slopes = [0.0; MOST + 2];
         if half_width < self.widest {
             slopes[1] = 2.0 / self.widest;
-            for n in 1..=MOST {
+            for n in 1..self.widths {
                 let own = (2 * n + 1) as f64 * by_width[n];
                 slopes[n + 1] = slopes[n - 1] + own * 2.0 / self.widest;
             }
@@ -106,9 +124,10 @@ impl HysteresisShape {
     /// The integral of P_a from -1, and P_a itself, at the value `place` of a play.
     fn by_place(&self, place: f64) -> impl Iterator<Item = (f64, f64)> {
         let f = (place - self.middle) / self.scale;
-        let values = Self::legendre(f.clamp(-1.0, 1.0));
+        let degrees = self.degrees();
+        let values = Self::legendre(f.clamp(-1.0, 1.0), degrees + 1);
         let inside = if f.abs() < 1.0 { 1.0 } else { 0.0 };
-        (1..=MOST).map(move |a| {
+        (1..=degrees).map(move |a| {
             let integral = (values[a + 1] - values[a - 1]) / (2 * a + 1) as f64;
             (integral, inside * values[a])
         })

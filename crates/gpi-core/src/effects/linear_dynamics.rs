@@ -7,6 +7,7 @@
 //! the natural frequency `|s| / 2 pi` and the damping `-Re s / |s|`, real poles give time constants `-1/s`;
 //! the static gain is `(b1 + b2) / (1 + a1 + a2)`.
 
+use super::creep::longest_lag;
 use super::flaws::{late, positive};
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Block, Coefficients, ParallelSections, Proposal, Quantity, Situation, Stage, Units};
@@ -62,6 +63,9 @@ impl LinearDynamics {
     }
 }
 
+/// From this damping on, a pair of poles hardly rings, and its response is like that of two lags: a quality factor of 1.
+const HARDLY_RINGS: f64 = 0.5;
+
 impl Block for LinearDynamics {
     fn values(&self) -> Vec<f64> {
         [&self.denominator[..], &self.numerator[..]].concat()
@@ -76,6 +80,19 @@ impl Block for LinearDynamics {
         // a step of the numerator changes the static gain by a ten-thousandth
         let gain = 1.0 + self.denominator.iter().sum::<f64>();
         vec![1e-6, 1e-6, 1e-4 * gain, 1e-4 * gain]
+    }
+
+    /// Poles that are as slow as creep ring: others are a relaxation, which creep describes.
+    fn is_plausible(&self, _: f64) -> bool {
+        let [a1, a2] = self.denominator[..] else { return true };
+        let discriminant = 0.25 * a1 * a1 - a2;
+        let (radius, damping) = if discriminant < 0.0 {
+            let (decay, angle) = (-0.5 * a2.ln(), (-0.5 * a1 / a2.sqrt()).acos());
+            (a2.sqrt(), decay / decay.hypot(angle))
+        } else {
+            (0.5 * a1.abs() + discriminant.sqrt(), 1.0)
+        };
+        -1.0 / radius.ln() <= longest_lag(self.rate) || damping < HARDLY_RINGS
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
@@ -129,5 +146,35 @@ impl ParallelSections for LinearDynamics {
 
     fn dead_time(&self) -> usize {
         self.dead_time
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A mode at a frequency in Hz.
+    fn mode(frequency: f64, damping: f64) -> LinearDynamics {
+        let rate = 1000.0;
+        let natural = std::f64::consts::TAU * frequency / rate;
+        let radius = (-damping * natural).exp();
+        let angle = natural * (1.0 - damping * damping).sqrt();
+        let denominator = vec![-2.0 * radius * angle.cos(), radius * radius];
+        LinearDynamics { input: 0, denominator, numerator: vec![0.0; 2], rate, dead_time: 0 }
+    }
+
+    #[test]
+    fn slow_poles_that_hardly_ring_are_no_mode() {
+        assert!(mode(100.0, 0.02).is_plausible(20.0));
+        assert!(mode(100.0, 0.7).is_plausible(20.0));
+        assert!(mode(0.3, 0.02).is_plausible(20.0));
+        assert!(!mode(0.3, 0.7).is_plausible(20.0));
+        // real poles with time constants of 0.1 s and 10 ms, and of 10 ms and 5 ms
+        let lags = |times: [f64; 2]| {
+            let [p, q] = times.map(|time| (-1e-3 / time).exp());
+            LinearDynamics { denominator: vec![-p - q, p * q], ..mode(1.0, 0.5) }
+        };
+        assert!(!lags([0.1, 0.01]).is_plausible(20.0));
+        assert!(lags([0.01, 0.005]).is_plausible(20.0));
     }
 }

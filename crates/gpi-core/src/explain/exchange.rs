@@ -22,7 +22,7 @@
 use super::judgement::{Significance, is_superfluous};
 use super::ranking::{Ranked, scored_beside};
 use super::state::{Addition, SearchState, Trial};
-use super::trial::{measured, plausible_part, start, threshold};
+use super::trial::{ANY, measured, plausible_part, start, threshold};
 use crate::Error;
 use crate::Progress;
 use crate::chain::point::Point;
@@ -47,8 +47,9 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
         let named = state.additions.iter().find(|addition| addition.trial.entry.name == slow.name);
         let Some(deviance) = named.map(|own| own.trial.deviance) else { continue };
         let gain = score.gain;
+        let threshold = settle(state, slow, state.setup.unknowns(&without), deviance, progress)?;
         let start = start(state, &without, score)?;
-        let options = longer(state);
+        let options = longer(state, reach(state, threshold));
         let fitted = as_trial(progress, ("exchange", entry.name), (0, 1), |progress| {
             let fitted = state.fit(start, &options, entry.name, progress)?;
             match plausible_part(state, &fitted.point, entry) {
@@ -56,7 +57,9 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
                 None => Ok(fitted),
             }
         })?;
-        let threshold = settle(state, slow, state.setup.unknowns(&without), deviance, progress)?;
+        if fitted.linearization.cost > options.goal {
+            continue;
+        }
         let trial = measured(state, &without, entry, fitted, options, gain, progress)?;
         let held_out = state.held_out(&state.point)?;
         let lost = lost(state, &trial, &held_out);
@@ -82,9 +85,10 @@ fn settled(
     state: &SearchState,
     point: Point,
     slow: &'static Entry,
+    goal: f64,
     progress: Progress,
 ) -> Result<Fitted, Error> {
-    let options = longer(state);
+    let options = longer(state, goal);
     let fit = |start: Point, progress: Progress| {
         as_trial(progress, ("exchange", slow.name), (0, 1), |progress| {
             state.fit(start, &options, slow.name, progress)
@@ -96,6 +100,9 @@ fn settled(
         values * fitted.linearization.cost.ln() + price
     };
     let mut best = fit(point, progress)?;
+    if goal > ANY && best.linearization.cost > goal {
+        return Ok(best);
+    }
     while let Some(coarser) = coarser(&best.point, slow) {
         let fitted = fit(coarser, progress)?;
         if information(&fitted) > information(&best) {
@@ -113,10 +120,16 @@ fn coarser(point: &Point, slow: &Entry) -> Option<Point> {
 }
 
 /// Options of both fits that are compared. They have the same step limit, because a fit that ends at its limit is not at its
-/// minimum.
-fn longer(state: &SearchState) -> FitOptions {
+/// minimum. Squares above `goal` are not asked for.
+fn longer(state: &SearchState, goal: f64) -> FitOptions {
     let steps = state.setup.policy.revision.longer * state.setup.options.steps;
-    FitOptions { steps, ..state.setup.options.clone() }
+    FitOptions { steps, goal, ..state.setup.options.clone() }
+}
+
+/// The training squares with which a rival loses twice a threshold: even with better held-out blocks, it does not replace what it
+/// loses that much against.
+fn reach(state: &SearchState, threshold: f64) -> f64 {
+    state.cost * (2.0 * threshold / state.prepared.values()).exp()
 }
 
 /// Settles the slow function of time of the present model. Returns what it must gain there: the residual of a fit that ended
@@ -128,7 +141,7 @@ fn settle(
     deviance: f64,
     progress: Progress,
 ) -> Result<f64, Error> {
-    let fitted = settled(state, state.point.clone(), slow, progress)?;
+    let fitted = settled(state, state.point.clone(), slow, ANY, progress)?;
     (state.point, state.cost) = (fitted.point.clone(), fitted.linearization.cost);
     let significance = Significance {
         values: state.prepared.values(),
@@ -136,7 +149,7 @@ fn settle(
         is_long: state.setup.is_long(&state.point),
         is_more: false,
     };
-    threshold(state, fitted, longer(state), significance, deviance, progress)
+    threshold(state, fitted, longer(state, ANY), significance, deviance, progress)
 }
 
 /// The deviance lost with a trial, on the training data and on what is held out.
@@ -162,13 +175,17 @@ pub(super) fn exchange_slow(state: &mut SearchState, progress: Progress) -> Resu
         let Some(Ranked { entry, score, .. }) = best else { continue };
         let gain = score.gain;
         let start = start(state, &without, score)?;
-        let fitted = settled(state, start, entry, progress)?;
         let unknowns = |point| state.setup.unknowns(point) as f64;
-        let price =
-            (unknowns(&fitted.point) - unknowns(&state.point)) * state.prepared.values().ln();
-        let trial = measured(state, &without, entry, fitted, longer(state), gain, progress)?;
+        let price = |point| (unknowns(point) - unknowns(&without)) * state.prepared.values().ln();
+        let options = longer(state, reach(state, price(&state.point)));
+        let fitted = settled(state, start, entry, options.goal, progress)?;
+        if fitted.linearization.cost > options.goal {
+            continue;
+        }
+        let more = price(&fitted.point) - price(&state.point);
+        let trial = measured(state, &without, entry, fitted, options, gain, progress)?;
         let held_out = state.held_out(&state.point)?;
-        let lost = lost(state, &trial, &held_out) + price;
+        let lost = lost(state, &trial, &held_out) + more;
         if -lost > 2.0 * state.setup.policy.judgement.looks.ln() {
             let dropped = vec![own.name];
             state.add(Addition { trial, others: Vec::new(), probability: None, dropped })?;

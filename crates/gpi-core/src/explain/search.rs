@@ -164,7 +164,10 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     others.extend(failed.into_iter().map(|one| failure(one, unchanged)));
     let Some(taken) = taken else {
         state.last = others;
-        let Some(better) = better else { return Ok(false) };
+        let Some(better) = better else {
+            // what a strong candidate promised may be that of a finer grid
+            return Ok(!state.is_rich && refine_grids(state, progress)?);
+        };
         (state.point, state.cost) = (better.point, better.linearization.cost);
         return Ok(true);
     };
