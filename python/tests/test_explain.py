@@ -8,6 +8,7 @@ import scipy.signal
 
 import gpi_hammerstein as gpi
 import plants
+from data_folder import DEV
 from gpi_hammerstein.explanation import in_words
 from records import actuator, drive
 
@@ -93,6 +94,22 @@ def test_a_column_that_repeats_a_channel_is_no_effect(channel):
     reference = 3.0 * getattr(run, channel) + 1.0 + 1e-3 * np.sin(np.arange(len(run.u)))
     found = gpi.explain(gpi.Record(run.u, run.y, RATE, covariates=reference))
     assert found.effects == ["creep"]
+
+
+@pytest.mark.slow
+def test_grids_are_refined_where_a_promising_effect_is_not_confirmed():
+    # beside its gain drift, a shape of the hysteresis promises what finer grids do
+    plant = plants.draw(1002, ("gain-drift",), None, 30.0)
+    found = gpi.explain(record_of(plant.record(0)))
+    assert found.effects == ["gain-drift"]
+    assert found.after["holdout"]["rms"] < 1.1 * plant.noise_std
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not DEV.is_dir(), reason=f"NO BLIND RECORDS in {DEV}: set GPI_DATA_DIR to run this test")
+def test_creep_is_neither_a_drift_nor_a_slow_mode():
+    found = gpi.explain(gpi.read_record(DEV / "record-18.csv.gz"))
+    assert set(found.effects) == {"creep", "gain-drift"}
 
 
 @pytest.mark.slow

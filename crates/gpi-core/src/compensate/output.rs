@@ -29,8 +29,13 @@ pub(super) fn require_in_range(model: &Model, reference: &Matrix) -> Result<(), 
         let [lowest, highest] = effect.range().map(|end| end + offset);
         let is_beyond = |value: &&f64| !(lowest..=highest).contains(*value);
         if let Some(value) = reference.column(output).iter().find(is_beyond) {
+            let range = match [lowest, highest].map(f64::is_finite) {
+                [true, true] => format!("{lowest} to {highest}"),
+                [true, false] => format!("at least {lowest}"),
+                _ => format!("at most {highest}"),
+            };
             let requirement = format!(
-                "the sensor of {} reads {lowest} to {highest} only; let the reference stay within, or take \
+                "the sensor of {} reads {range} only; let the reference stay within, or take \
                  output-nonlinearity out of the model",
                 model.outputs()[output].name
             );
@@ -48,7 +53,7 @@ fn undo(effect: &dyn OutputStage, signal: &mut [f64], rate: f64) {
     let (mut before, mut memory) = (signal[0], None::<Vec<f64>>);
     for (k, value) in signal.iter_mut().enumerate() {
         let [lowest, highest] = effect.range();
-        let wanted = value.clamp(lowest, highest);
+        let wanted = value.max(lowest).min(highest);
         let show = |x: f64| {
             let mut own = memory.clone().unwrap_or_else(|| effect.rest(x));
             (effect.sense(&mut own, x, moment(k)).0, own)

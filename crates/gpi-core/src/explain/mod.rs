@@ -39,6 +39,7 @@ mod policy;
 mod probability;
 mod projection;
 mod ranking;
+mod refusal;
 mod repair;
 mod residual;
 mod revision;

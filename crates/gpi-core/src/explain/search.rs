@@ -5,9 +5,10 @@ use super::exchange::{exchange_slow, prefer_driven};
 use super::force_at_input::enter_with_input;
 use super::forces::{Balanced, balanced, forces, remember_out_of_reach};
 use super::grid::refine_grids;
-use super::judgement::{Evidence, Refusal, choose, judge, refusal};
+use super::judgement::{Evidence, choose, judge, refusal};
 use super::probability::probabilities;
 use super::ranking::{ranked, scored_beside};
+use super::refusal::Refusal;
 use super::revision::{
     drop_superfluous, rearrange, settle_lags, shed_lags, shed_lines, shed_sections, straighten,
 };

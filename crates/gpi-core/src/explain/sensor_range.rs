@@ -27,8 +27,11 @@ pub(super) fn clipping(
     policy: &OutsidePolicy,
     progress: Progress,
 ) -> Result<Option<Point>, Error> {
+    if record.outputs().len() > 1 {
+        return Ok(None);
+    }
     let ends = limits(record, 0, policy)?;
-    if ends.is_empty() || record.outputs().len() > 1 {
+    if ends.is_empty() {
         return Ok(None);
     }
     let found = identified(record, options, policy, progress);

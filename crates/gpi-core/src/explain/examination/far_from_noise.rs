@@ -29,7 +29,7 @@ use super::contribution::contribution;
 use crate::chain::point::Point;
 use crate::effects::{FreeOrder, Place, Signature};
 use crate::explain::force_balance::balance;
-use crate::explain::judgement::Refusal;
+use crate::explain::refusal::Refusal;
 use crate::explain::state::SearchState;
 use crate::{Error, Experiment, Progress, Record};
 

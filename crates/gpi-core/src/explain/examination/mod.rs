@@ -32,8 +32,9 @@ mod gaps;
 mod own_part;
 mod within_limits;
 
-use super::judgement::{Evidence, Refusal, judge};
+use super::judgement::{Evidence, judge};
 use super::outside::saturates;
+use super::refusal::Refusal;
 use super::state::{SearchState, Trial};
 use super::trial::{fitted, join_modes};
 use crate::chain::point::Point;
