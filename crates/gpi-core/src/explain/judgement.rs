@@ -11,7 +11,7 @@
 //!    (Bonferroni's correction, since a chi-square tail falls as `exp(-x / 2)`); `p N` asks for a part p of the squares.
 //!    Autocorrelated residuals are worth fewer samples than they have: with a factor kappa, by which the covariance
 //!    of the parameters exceeds that for white noise, the first two terms count kappa times.
-//! 3. *Confirmed*: the squares of the held-out blocks fall, see [`is_confirmed`], and by nearly as large a part as those of
+//! 3. *Confirmed*: the squares of the held-out blocks fall, see [`is_confirmed`] and [`is_foreseen`], and by nearly as large a part as those of
 //!    the training data, or by most of the squares of what the effect changes there, see [`is_seen`]. A model with fewer unknowns than the present one adds nothing that chance could use: of it, the fall of
 //!    the sum is enough, if it is substantial.
 //! 4. *Substantial*: far from the noise a bad fit resembles many effects a little, so a large part of the training
@@ -83,6 +83,8 @@ pub(super) struct Evidence<'a> {
     pub noise: f64,
     /// Squares of each held-out block without and with the effect.
     pub held_out: [&'a [f64]; 2],
+    /// M, the number of their values.
+    pub held_out_values: f64,
     /// Squares of what it changes of the held-out output, where that was computed.
     pub change: Option<f64>,
     /// Whether the input makes it explain what it does, where it is an effect that the input drives.
@@ -113,7 +115,9 @@ pub(super) fn judge(trial: &Evidence, policy: &JudgementPolicy) -> Result<(), Re
         Err(Refusal::Undriven)
     } else if trial.deviance <= trial.threshold {
         Err(Refusal::Insignificant)
-    } else if !(is_confirmed(trial.held_out, policy) || is_better_and_simpler(trial, policy))
+    } else if !(is_confirmed(trial.held_out, policy)
+        || is_better_and_simpler(trial, policy)
+        || is_foreseen(trial, policy))
         || !is_seen(trial, policy)
     {
         Err(Refusal::Unconfirmed)
@@ -186,9 +190,24 @@ fn explains_as_much(trial: &Evidence, other: &Evidence) -> bool {
 fn is_seen(trial: &Evidence, policy: &JudgementPolicy) -> bool {
     let part = |[before, after]: [f64; 2]| 1.0 - after / before.max(f64::MIN_POSITIVE);
     let held_out = trial.held_out.map(|blocks| blocks.iter().sum());
-    let falls = held_out[0] - held_out[1];
-    part(held_out) >= policy.seen * part(trial.squares)
-        || trial.change.is_some_and(|change| falls >= policy.predicted * change)
+    part(held_out) >= policy.seen * part(trial.squares) || falls_as_predicted(trial, policy)
+}
+
+/// Whether the held-out squares fall by most of the squares of what the effect changes there.
+fn falls_as_predicted(trial: &Evidence, policy: &JudgementPolicy) -> bool {
+    let [before, after] = trial.held_out.map(|blocks| blocks.iter().sum::<f64>());
+    trial.change.is_some_and(|change| before - after >= policy.predicted * change)
+}
+
+/// Whether an effect brings the model near the noise, and the held-out squares T of M values fall as predicted and by more than
+/// chance: `M ln(T_before / T_after) > 2 ln L` for L looks. Near the noise, nothing but noise is left that could look like the effect,
+/// and blocks differ because they show different parts of it.
+fn is_foreseen(trial: &Evidence, policy: &JudgementPolicy) -> bool {
+    let [before, after] = trial.held_out.map(|blocks| blocks.iter().sum::<f64>());
+    let deviance = trial.held_out_values * (before / after.max(f64::MIN_POSITIVE)).ln();
+    trial.squares[1] < policy.near_noise * trial.noise
+        && falls_as_predicted(trial, policy)
+        && deviance > 2.0 * policy.looks.ln()
 }
 
 /// Whether the model of a trial has fewer unknowns, and substantially smaller squares of both kinds.
@@ -263,6 +282,7 @@ mod tests {
             squares: [100.0, 60.0],
             noise: 1.0,
             held_out: [&BEFORE, &AFTER],
+            held_out_values: 400.0,
             change: None,
             is_driven: true,
             is_simpler: false,
@@ -299,6 +319,17 @@ mod tests {
         assert_eq!(unsure(false, &UNEVEN), Err(Refusal::Unconfirmed));
         assert_eq!(unsure(true, &UNEVEN), Ok(()));
         assert_eq!(unsure(true, &[1.0, 17.0, 9.0, 8.0]), Err(Refusal::Unconfirmed));
+        // unsure by block, and as predicted near the noise
+        let foreseen = |left, change| {
+            judged(|trial| {
+                (trial.held_out, trial.change) = ([&BEFORE, &UNEVEN], change);
+                trial.squares[1] = left;
+            })
+        };
+        assert_eq!(foreseen(2.0, Some(14.0)), Ok(()));
+        assert_eq!(foreseen(2.0, Some(20.0)), Err(Refusal::Unconfirmed));
+        assert_eq!(foreseen(2.0, None), Err(Refusal::Unconfirmed));
+        assert_eq!(foreseen(60.0, Some(14.0)), Err(Refusal::Unconfirmed));
         // a part of 0.02 in the blocks, of 0.4 in the training data: the blocks may show little of it
         let little_shown = |change| {
             judged(|trial| {

@@ -212,6 +212,7 @@ fn evidence<'a>(
         squares,
         noise,
         held_out,
+        held_out_values: state.setup.held_out_values(),
         change,
         is_driven: trial.is_driven,
         is_simpler: state.setup.estimated(&trial.point) < state.setup.estimated(&state.point),
