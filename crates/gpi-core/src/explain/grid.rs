@@ -4,13 +4,17 @@
 //! change of the output by its weight. The columns are projected off the model's sensitivities ([`Projection`]) and
 //! taken one after the other (orthogonal matching pursuit): the one that takes most of the squares, `s_i^2 / L_ii`,
 //! comes first, and is then projected off the others, `L -= L_i L_i' / L_ii` and `s -= s_i L_i / L_ii`.
+//!
+//! A strong candidate is fitted on the grids as they are, because finer ones would bend to what it explains. Before it is taken, finer
+//! grids are tried without it. It is superfluous where they lose less than its threshold.
 
 use super::base::Base;
+use super::judgement::is_superfluous;
 use super::policy::GridPolicy;
 use super::policy::score::LEFT;
 use super::projection::Projection;
 use super::setup::SearchSetup;
-use super::state::SearchState;
+use super::state::{SearchState, Trial};
 use crate::chain::bounds::range;
 use crate::chain::free_run::Signals;
 use crate::chain::point::Point;
@@ -66,6 +70,25 @@ pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Resul
         }
     }
     Ok(gained)
+}
+
+/// Takes finer grids where they explain as much as a trial: the effect is then superfluous beside them. Says whether they do.
+pub(super) fn finer_grids_instead(
+    state: &mut SearchState,
+    trial: &Trial,
+    progress: Progress,
+) -> Result<bool, Error> {
+    let before = (state.point.clone(), state.cost);
+    let is_finer = refine_grids(state, progress)?;
+    let lost = state.prepared.values() * (state.cost / trial.cost).ln();
+    let held_out = state.held_out(&state.point)?;
+    let factor = state.setup.policy.revision.superfluous;
+    if is_finer && is_superfluous(lost, trial.threshold, [&trial.held_out, &held_out], factor) {
+        return Ok(true);
+    }
+    (state.point, state.cost) = before;
+    state.is_rich = false;
+    Ok(false)
 }
 
 /// A point fitted with grids that move, plays and deadzones without use left out; and its squares.

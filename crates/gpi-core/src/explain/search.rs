@@ -4,7 +4,7 @@ use super::examination::{doubt, examine};
 use super::exchange::{exchange_slow, prefer_driven};
 use super::force_at_input::enter_with_input;
 use super::forces::{Balanced, balanced, forces, remember_out_of_reach};
-use super::grid::refine_grids;
+use super::grid::{finer_grids_instead, refine_grids};
 use super::judgement::{Evidence, choose, judge, refusal};
 use super::probability::probabilities;
 use super::ranking::{ranked, scored_beside};
@@ -138,6 +138,10 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
         let Some(place) = choose(&evidences, measured, judgement) else { break None };
         let examined = examine(state, &trials[place], &evidences[place], progress)?;
         if examined.refusal.is_none() {
+            // what the declared model can explain is no effect
+            if !state.is_rich && finer_grids_instead(state, &trials[place], progress)? {
+                return Ok(true);
+            }
             break Some(place);
         }
         evidences[place].doubt = examined.refusal;
