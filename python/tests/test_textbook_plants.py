@@ -13,7 +13,11 @@ SEEDS = (1000, 1001)
 # A slew limit explains the responses to four jumps; a sensor's curve a part of what a motor integrates.
 # A column leaks through a lag that has not settled when the record begins.
 # A slow error of the model is no coloured noise where the noise at rest is white.
-MORE = [("maxwell-slip", 1009), ("motor", 3002), ("lagged-leak", 1005), ("heater", 1003)]
+# Finer grids do what another shape of the hysteresis would. A gain does not drift faster than a tank fills.
+MORE = [
+    *(("maxwell-slip", 1009), ("motor", 3002), ("lagged-leak", 1005), ("heater", 1003)),
+    *(("clipped", 2000), ("tanks", 2002)),
+]
 INTEGRATING = ("motor", "hydraulic")
 # Their lags outlast the impulse response that the record affords.
 SLOW = [("tanks", 1003), ("tanks", 1004), ("tanks", 1005), ("heater", 1001)]

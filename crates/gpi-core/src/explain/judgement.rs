@@ -322,7 +322,8 @@ mod tests {
         // unsure by block, and as predicted near the noise
         let foreseen = |left, change| {
             judged(|trial| {
-                (trial.held_out, trial.change) = ([&BEFORE, &UNEVEN], change);
+                trial.held_out = [&BEFORE, &UNEVEN];
+                trial.change = change;
                 trial.squares[1] = left;
             })
         };

@@ -107,7 +107,7 @@ impl Memory {
 }
 
 /// Whether a pole is that of a lag: real and positive.
-pub(crate) fn is_lag(pole: &Complex<f64>) -> bool {
+fn is_lag(pole: &Complex<f64>) -> bool {
     pole.im == 0.0 && pole.re > 0.0
 }
 

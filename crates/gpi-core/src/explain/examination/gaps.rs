@@ -29,14 +29,15 @@
 use crate::chain::point::Point;
 use crate::effects::Block;
 use crate::explain::state::SearchState;
-use crate::fit::memory::{is_lag, time_constant};
+use crate::fit::memory::time_constant;
+use crate::linear::resonates;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{Cholesky, DVector};
 
-/// Whether the function of time has knots at shorter distances than the longest time constant of a lag of G: it may then follow
-/// what the dynamics lack.
+/// Whether the function of time has knots at shorter distances than the longest time constant of the poles of G without resonance:
+/// it may then follow what the dynamics lack.
 pub(super) fn is_as_fast_as_lags(record: &Record, point: &Point, place: usize) -> bool {
-    let lags = point.dynamics.poles().into_iter().filter(is_lag);
+    let lags = point.dynamics.poles().into_iter().filter(|pole| !resonates(pole));
     spacing(record, point, place) < lags.map(|pole| time_constant(&pole)).fold(0.0, f64::max)
 }
 
