@@ -16,7 +16,7 @@ SEEDS = (1000, 1001)
 # Finer grids do what another shape of the hysteresis would. A gain does not drift faster than a tank fills.
 MORE = [
     *(("maxwell-slip", 1009), ("motor", 3002), ("lagged-leak", 1005), ("heater", 1003)),
-    *(("clipped", 2000), ("tanks", 2002)),
+    *(("clipped", 2000), ("tanks", 2002), ("tanks", 2004)),
 ]
 INTEGRATING = ("motor", "hydraulic")
 # Their lags outlast the impulse response that the record affords.

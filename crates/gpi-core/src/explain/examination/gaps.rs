@@ -34,11 +34,12 @@ use crate::linear::resonates;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{Cholesky, DVector};
 
-/// Whether the function of time has knots at shorter distances than the longest time constant of the poles of G without resonance:
-/// it may then follow what the dynamics lack.
+/// Whether the function of time may follow what the dynamics lack. Knots at a distance h follow frequencies up to `1 / (2 h)`, and a
+/// pole without resonance of time constant T has its corner at `1 / (2 pi T)`: knots are as fast as it where `h < pi T`.
 pub(super) fn is_as_fast_as_lags(record: &Record, point: &Point, place: usize) -> bool {
     let lags = point.dynamics.poles().into_iter().filter(|pole| !resonates(pole));
-    spacing(record, point, place) < lags.map(|pole| time_constant(&pole)).fold(0.0, f64::max)
+    let longest = lags.map(|pole| time_constant(&pole)).fold(0.0, f64::max);
+    spacing(record, point, place) < std::f64::consts::PI * longest
 }
 
 /// The distance of the knots, in samples.
