@@ -40,8 +40,8 @@ pub struct HysteresisShape {
 /// The largest A and B.
 const MOST: usize = 10;
 
-/// The factors of `P_(n+1) = (2 n + 1) / (n + 1) x P_n - n / (n + 1) P_(n-1)`: the polynomials are asked for at every sample of every
-/// play, and divisions would take most of the time.
+/// The factors of `P_(n+1) = (2 n + 1) / (n + 1) x P_n - n / (n + 1) P_(n-1)`. They are constants because the
+/// polynomials are computed at every sample of every play.
 const RECURSION: [[f64; 2]; MOST + 1] = {
     let mut factors = [[0.0; 2]; MOST + 1];
     let mut n = 0;

@@ -63,7 +63,7 @@ impl LinearDynamics {
     }
 }
 
-/// From this damping on, a pair of poles hardly rings, and its response is like that of two lags: a quality factor of 1.
+/// From this damping on, a pair of poles hardly rings, and its response is like that of two lags: a quality factor of 1. By hand.
 const HARDLY_RINGS: f64 = 0.5;
 
 impl Block for LinearDynamics {
@@ -82,7 +82,7 @@ impl Block for LinearDynamics {
         vec![1e-6, 1e-6, 1e-4 * gain, 1e-4 * gain]
     }
 
-    /// Poles that are as slow as creep ring: others are a relaxation, which creep describes.
+    /// Whether its poles are faster than the lags of creep, or ring. A slow pair that hardly rings is a relaxation, which creep describes.
     fn is_plausible(&self, _: f64) -> bool {
         let [a1, a2] = self.denominator[..] else { return true };
         let discriminant = 0.25 * a1 * a1 - a2;

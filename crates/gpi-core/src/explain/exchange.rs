@@ -126,8 +126,8 @@ fn longer(state: &SearchState, goal: f64) -> FitOptions {
     FitOptions { steps, goal, ..state.setup.options.clone() }
 }
 
-/// The training squares with which a rival loses twice a threshold: even with better held-out blocks, it does not replace what it
-/// loses that much against.
+/// The training squares with which a rival loses twice a threshold. The factor leaves room for a rival whose held-out blocks are better,
+/// which counts as well. By hand.
 fn reach(state: &SearchState, threshold: f64) -> f64 {
     state.cost * (2.0 * threshold / state.prepared.values()).exp()
 }
