@@ -17,6 +17,7 @@ SEEDS = (1000, 1001)
 MORE = [
     *(("maxwell-slip", 1009), ("motor", 3002), ("lagged-leak", 1005), ("heater", 1003)),
     *(("clipped", 2000), ("tanks", 2002), ("tanks", 2004)),
+    *(("hydraulic", 1001), ("hydraulic", 2004), ("hydraulic", 2005)),
 ]
 INTEGRATING = ("motor", "hydraulic")
 # Their lags outlast the impulse response that the record affords.

@@ -156,6 +156,11 @@ impl Law {
         matches!(self, Self::BoucWen { .. } | Self::Dahl { .. })
     }
 
+    /// Whether it is a spring with hysteresis: w follows a small change of z by as much.
+    pub(crate) fn is_spring(&self) -> bool {
+        matches!(self, Self::BoucWen { .. })
+    }
+
     /// Whether it is a limit of what it sees.
     pub(crate) fn limits(&self) -> bool {
         matches!(self, Self::Excess { .. })

@@ -103,6 +103,8 @@ pub(super) struct Evidence<'a> {
     pub is_slow: bool,
     /// Whether it is added to the output, and does nothing else.
     pub is_added: bool,
+    /// Whether the output integrates the input, and the error of a simulation is all that speaks for it.
+    pub is_integrated: bool,
     /// Why its examination ended without a name, if so.
     pub doubt: Option<Refusal>,
 }
@@ -222,10 +224,13 @@ fn is_substantial(trial: &Evidence, policy: &JudgementPolicy) -> bool {
         && takes(policy.substantial_held_out, trial.held_out.map(|blocks| blocks.iter().sum()))
 }
 
-/// Whether a trial is substantial, or need not be.
+/// Whether a trial is substantial, or need not be. Where the output integrates the input, small errors of v add up to a residual
+/// that follows the output, the input or time, so that only what is added to the output may take a small part of it.
 fn is_weighty(trial: &Evidence, policy: &JudgementPolicy) -> bool {
     let [before, after] = trial.squares;
-    let is_near_noise = after < policy.near_noise * trial.noise
+    let adds_up = trial.is_integrated && !trial.is_added;
+    let is_near_noise = !adds_up
+        && after < policy.near_noise * trial.noise
         && before - after > policy.beyond_rest * (after - trial.noise);
     is_substantial(trial, policy) || is_near_noise || trial.is_unique || trial.is_more
 }
@@ -292,6 +297,7 @@ mod tests {
             is_measured: false,
             is_slow: false,
             is_added: false,
+            is_integrated: false,
             doubt: None,
         }
     }
@@ -309,6 +315,16 @@ mod tests {
         assert_eq!(judged(|trial| trial.deviance = 40.0), Err(Refusal::Insignificant));
         let unconfirmed = judged(|trial| trial.held_out = [&BEFORE, &BEFORE]);
         assert_eq!(unconfirmed, Err(Refusal::Unconfirmed));
+        // a small part near the noise, which the errors of a plant that integrates may take
+        let small = |is_integrated, is_added| {
+            judged(|trial| {
+                trial.squares = [1.3, 1.02];
+                (trial.is_integrated, trial.is_added) = (is_integrated, is_added);
+            })
+        };
+        assert_eq!(small(false, false), Ok(()));
+        assert_eq!(small(true, false), Err(Refusal::Insubstantial));
+        assert_eq!(small(true, true), Ok(()));
         // unsure by block, which fewer unknowns make up for
         let unsure = |is_simpler, after: &'static [f64]| {
             judged(|trial| {

@@ -280,6 +280,9 @@ settings! {
         /// Part of the excess over a limit that a limit may leave in steady state. By hand: water rises above a rim, too, but most of it
         /// runs off. What leaves more is a kink of a restoring force.
         excess: f64 = 1.0 / 3.0, PART;
+        /// Stiffness of a hysteretic spring over the linear one, at most. By hand: structures that yield keep 2 to 20 % of their
+        /// stiffness. Beside no spring at all, the same force is friction.
+        hysteretic: f64 = 1e3, POSITIVE;
         /// Part by which the squares must fall for the model without a refused effect to be taken instead of the present one:
         /// that of a finer grid that goes on.
         better: f64 = 0.02, PART;

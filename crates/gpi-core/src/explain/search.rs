@@ -226,6 +226,7 @@ fn evidence<'a>(
         is_measured: trial.entry.driven && trial.entry.stage == Stage::Added,
         is_slow: trial.entry.signature == Signature::SlowInTime,
         is_added: trial.entry.stage == Stage::Added,
+        is_integrated: balanced.is_none() && state.integrates()?,
         doubt: (balanced.is_some() && is_worse).then_some(Refusal::Unconfirmed),
     })
 }

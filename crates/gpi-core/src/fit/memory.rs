@@ -2,7 +2,8 @@
 //!
 //! Let `G = F + S`, S the poles without resonance that are slower than the longest lag of the dynamics, F all else. Creep and drift
 //! add to a response that is there at once. If `|F v| < c |G v|` (norms over the record, v counted from its first sample), the plant
-//! itself is slow, such as a tank that fills, and S is neither. Otherwise, if `|F(1)| < c |G(1)|` with the real poles alone as S, S is
+//! itself is slow, such as a tank that fills, and S is neither. If the same holds with the poles as S that the record does not show
+//! to settle, the plant integrates its input, and these poles belong to it. Otherwise, if `|F(1)| < c |G(1)|` with the real poles alone as S, S is
 //! not creep, but it may be a disturbance.
 
 use crate::chain::point::Point;
@@ -42,14 +43,23 @@ impl Memory {
         point: &Point,
         prepared: &Prepared,
     ) -> Result<Vec<Complex<f64>>, Error> {
-        Ok(self.lags_of(&point.dynamics, self.is_slow_plant(point, prepared)?))
+        let is_slow_plant = self.is_slow_plant(point, prepared)?;
+        self.lags_of(point, prepared, is_slow_plant)
     }
 
     /// The same, where it is known whether the plant is slow.
-    fn lags_of(&self, own: &Sections, is_slow_plant: bool) -> Vec<Complex<f64>> {
+    fn lags_of(
+        &self,
+        point: &Point,
+        prepared: &Prepared,
+        is_slow_plant: bool,
+    ) -> Result<Vec<Complex<f64>>, Error> {
+        let own = &point.dynamics;
         let is_slow = |pole: &Complex<f64>| is_lag(pole) && time_constant(pole) > self.lag;
         let limit = if is_slow_plant {
-            self.of_slow_plant
+            // an integrator
+            let integrates = self.is_carried_beyond(self.of_slow_plant, point, prepared)?;
+            if integrates { f64::INFINITY } else { self.of_slow_plant }
         } else if own.with_poles(|pole| !is_slow(pole)).dc_gain().norm()
             < self.at_once * own.dc_gain().norm()
         {
@@ -58,7 +68,7 @@ impl Memory {
             self.lag
         };
         let exceeds = |pole: &Complex<f64>| is_lag(pole) && time_constant(pole) > limit;
-        own.poles().into_iter().filter(exceeds).collect()
+        Ok(own.poles().into_iter().filter(exceeds).collect())
     }
 
     /// Whether a pole is as slow as a disturbance, `-1 / ln|pole|` its time constant.
@@ -73,7 +83,7 @@ impl Memory {
         prepared: &Prepared,
     ) -> Result<Vec<Complex<f64>>, Error> {
         let is_slow_plant = self.is_slow_plant(point, prepared)?;
-        let lags = self.lags_of(&point.dynamics, is_slow_plant);
+        let lags = self.lags_of(point, prepared, is_slow_plant)?;
         let is_slow = |pole: &Complex<f64>| {
             let is_own = is_slow_plant && is_lag(pole);
             lags.contains(pole) || self.is_disturbance(pole) && !is_own
@@ -88,7 +98,17 @@ impl Memory {
 
     /// Whether poles that are slower than the lags of a mechanical stage, and do not resonate, carry the movement.
     pub(crate) fn is_slow_plant(&self, point: &Point, prepared: &Prepared) -> Result<bool, Error> {
-        let is_fast = |pole: &Complex<f64>| resonates(pole) || time_constant(pole) <= self.lag;
+        self.is_carried_beyond(self.lag, point, prepared)
+    }
+
+    /// Whether poles that are slower than a time constant, and do not resonate, carry the movement.
+    fn is_carried_beyond(
+        &self,
+        longest: f64,
+        point: &Point,
+        prepared: &Prepared,
+    ) -> Result<bool, Error> {
+        let is_fast = |pole: &Complex<f64>| resonates(pole) || time_constant(pole) <= longest;
         if prepared.record.longest() < self.enough || point.dynamics.poles().iter().all(is_fast) {
             return Ok(false);
         }

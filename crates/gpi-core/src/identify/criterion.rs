@@ -118,6 +118,21 @@ impl<'a> Comparison<'a> {
         Ok(refined.fitted.point)
     }
 
+    /// Refines a point that is no candidate yet as long as it gains, for starts that are far from where they lead.
+    pub(super) fn settled(&self, point: Point, progress: Progress) -> Result<Point, Error> {
+        let Self { prepared, options, fast, policy, .. } = self;
+        let mut settled = point;
+        let mut last = f64::INFINITY;
+        for _ in 0..policy.repeats {
+            let refined = joint(settled, prepared, options, f64::INFINITY, *fast, progress)?.fitted;
+            (settled, last) = match refined.linearization.cost {
+                cost if cost < (1.0 - policy.settled) * last => (refined.point, cost),
+                _ => return Ok(refined.point),
+            };
+        }
+        Ok(settled)
+    }
+
     /// Drops a candidate because of its error.
     pub(super) fn drop_failed(&mut self, error: Error) {
         self.failures.push(error);

@@ -13,6 +13,7 @@ mod criterion;
 mod elements;
 mod entry;
 mod identification;
+mod integrating_plant;
 pub(crate) mod long_record;
 pub(crate) mod procedure;
 mod quasi_static;

@@ -21,6 +21,7 @@ use crate::fit::joint::Refined;
 use crate::fit::preparation::Prepared;
 use crate::identify::alternation::{self, Taps};
 use crate::identify::identification::{Candidate, IdentifyOptions, Quick, Round};
+use crate::identify::integrating_plant;
 use crate::identify::quasi_static;
 use crate::identify::settings::{AlternationPolicy, IdentifySettings};
 use crate::identify::slow_plant;
@@ -137,6 +138,17 @@ pub(super) fn compare_elements(
         search.slow(&seed, progress)?;
         if options.order.is_none() {
             search.orders(&mut few, settings, progress)?;
+        }
+    }
+    if let Some(best) = search.best() {
+        let start = (&grid, few);
+        let integrated =
+            integrating_plant::seed(&best, start, options, prepared, settings, progress);
+        if let Some(seed) = Error::unless_interrupted(integrated)?.ok().flatten() {
+            search.begin_at(seed, progress)?;
+            if options.order.is_none() {
+                search.shed(progress)?;
+            }
         }
     }
     if let Some(best) = search.best() {

@@ -109,6 +109,12 @@ settings! {
         /// Plays and deadzones of each rung, from many to few; the last one is the linear model. By hand.
         plays: [usize; 6] = [24, 16, 12, 8, 6, 1], FROM_ONE;
         deadzones: [usize; 6] = [10, 7, 5, 4, 2, 0], 0.0..=1e3;
+        /// Half-widths of dead bands about zero, as parts of the input's reach. By hand: the fit moves them.
+        dead_bands: [f64; 2] = [0.02, 0.06], PART;
+        /// Fits in a row of what begins at a dead band or at the rate of the output, and the part of the squares below which one is the
+        /// last. By hand: thresholds of a dead band move far while the slope between them vanishes.
+        repeats: usize = 6, FROM_ONE;
+        settled: f64 = 0.01, PART;
         /// Structures in a row that gain nothing and end a series: after one of them the next may be better, such as
         /// an even order after an odd one.
         missed: usize = 2, FROM_ONE;

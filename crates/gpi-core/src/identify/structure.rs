@@ -238,6 +238,59 @@ impl<'a> StructureSearch<'a> {
         }
     }
 
+    /// Tries a point as it is, and new grids before its dynamics.
+    pub(super) fn begin_at(&mut self, point: Point, progress: Progress) -> Result<(), Error> {
+        self.climb(&point, progress)?;
+        self.dead_bands(&point, progress)?;
+        let settled = self.comparison.settled(point, progress);
+        if let Ok(settled) = Error::unless_interrupted(settled)? {
+            self.comparison.offer(settled, progress)?;
+        }
+        Ok(())
+    }
+
+    /// Tries dead bands about zero before the dynamics of a point, such as those of a valve's overlap or of a drive, where no grid is given.
+    fn dead_bands(&mut self, point: &Point, progress: Progress) -> Result<(), Error> {
+        let fewer = self.quick.map_or([false; 2], |quick| quick.fewer);
+        let is_free = |(given, fewer): (&Option<Grid>, bool)| given.is_none() || fewer;
+        if ![&self.half_widths, &self.thresholds].into_iter().zip(fewer).all(is_free) {
+            return Ok(());
+        }
+        let record = &self.comparison.prepared.record;
+        let reach = (0..record.inputs().len())
+            .map(|input| range(record, input))
+            .map(|(low, high)| high.min(-low))
+            .fold(f64::INFINITY, f64::min);
+        if reach <= 0.0 {
+            return Ok(());
+        }
+        let Comparison { prepared, policy, .. } = &self.comparison;
+        let bands: Vec<Point> = policy
+            .dead_bands
+            .iter()
+            .map(|part| {
+                let mut band = prepared.point(point.dynamics.clone());
+                band.offsets.clone_from(&point.offsets);
+                for (channel, own) in band.channels.iter_mut().zip(&point.channels) {
+                    let (elements, width) = (channel.elements, part * reach);
+                    let zones = vec![-width, width];
+                    let identity = Parameters::identity(channel.reading, zones, vec![0.0]);
+                    *channel = Parameters { elements, slopes: vec![0.0, 1.0, 1.0], ..identity };
+                    channel.weights[0] = own.weights.iter().sum();
+                }
+                prepared.settle(&mut band);
+                band
+            })
+            .collect();
+        for band in bands {
+            let settled = self.comparison.settled(band, progress);
+            if let Ok(settled) = Error::unless_interrupted(settled)? {
+                self.comparison.offer(settled, progress)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Tries the best fit of all without the poles that rule it out: a lower order drops the weakest mode
     /// instead, which may be the stage's own resonance.
     pub(super) fn shed(&mut self, progress: Progress) -> Result<(), Error> {

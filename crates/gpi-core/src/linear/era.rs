@@ -26,8 +26,9 @@ const GAP: f64 = 20.0;
 /// amplitude.
 const REST: f64 = 1e-4;
 
-/// Poles are kept inside the unit circle by this margin: a transient of 10^6 samples outlasts a usual record.
-const MARGIN: f64 = 1e-6;
+/// Poles are kept inside the unit circle by this margin: a transient of 10^10 samples outlasts any record by far, so that a pole that
+/// integrates keeps its place when a system is realized again.
+const MARGIN: f64 = 1e-10;
 
 /// Options of [`realize`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

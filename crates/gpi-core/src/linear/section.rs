@@ -37,8 +37,9 @@ pub(crate) fn advance(a: &[f64], state: &mut [f64], driven: impl Fn(usize) -> f6
     }
 }
 
-/// Distance from the unit circle inside which poles are kept: nearer ones have a memory of more than 10^7 samples.
-const MARGIN: f64 = 1e-7;
+/// Distance from the unit circle inside which poles are kept: nearer ones have a memory of more than 10^10 samples. The output of a
+/// plant that integrates may be 10^4 times its noise over 10^5 samples, and a pole that forgets a part of it would be seen.
+const MARGIN: f64 = 1e-10;
 
 /// The largest modulus of a pole.
 pub(crate) const LARGEST_POLE: f64 = 1.0 - MARGIN;

@@ -4,7 +4,7 @@
 //! else. Before its effect is named it must also pass the following.
 //!
 //! 1. *Possible*: its values are such as a machine can have ([`Block::is_possible`]). G resonates if the effect acts inside a
-//!    mechanical loop, and a hysteretic force opposes the displacement. A mode does not follow a line, creep or a disturbance ([`crate::fit::line_modes`],
+//!    mechanical loop, and a hysteretic force opposes the displacement. A hysteretic spring acts beside a linear one. A mode does not follow a line, creep or a disturbance ([`crate::fit::line_modes`],
 //!    [`crate::fit::memory`]).
 //! 2. *Not a longer fit*: the model without it, fitted again from where the trial ended, does worse by more than chance.
 //!
@@ -186,7 +186,10 @@ fn impossible(state: &SearchState, point: &Point, place: usize) -> Result<Option
         if !effect.limits() && !shows {
             return Ok(Some(Refusal::NoResonance));
         }
-        if closed.loops().iter().any(|inner| adds_energy(point, inner)) {
+        let most = state.setup.policy.examination.hysteretic;
+        let is_impossible =
+            |inner: &InnerLoop| adds_energy(point, inner) || lacks_spring(point, inner, most);
+        if closed.loops().iter().any(is_impossible) {
             return Ok(Some(Refusal::Impossible));
         }
     }
@@ -202,4 +205,10 @@ fn adds_energy(point: &Point, inner: &InnerLoop) -> bool {
 /// Where the newest effect of a name stands.
 fn newest(point: &Point, name: &str) -> Option<usize> {
     point.effects.iter().rposition(|effect: &Effect| effect.name() == name)
+}
+
+/// Whether the stiffness of a hysteretic spring is more than `most` times the linear one: a force on a mass without a spring is friction.
+fn lacks_spring(point: &Point, inner: &InnerLoop, most: f64) -> bool {
+    let force = point.steady_force(inner);
+    inner.law.is_spring() && force.is_some_and(|force| force.over_stiffness > most)
 }
