@@ -14,6 +14,7 @@ SEEDS = (1000, 1001)
 # A column leaks through a lag that has not settled when the record begins.
 # A slow error of the model is no coloured noise where the noise at rest is white.
 # Finer grids do what another shape of the hysteresis would. A gain does not drift faster than a tank fills.
+# The overlap of a valve is a dead band of the declared model, and no friction.
 MORE = [
     *(("maxwell-slip", 1009), ("motor", 3002), ("lagged-leak", 1005), ("heater", 1003)),
     *(("clipped", 2000), ("tanks", 2002), ("tanks", 2004)),

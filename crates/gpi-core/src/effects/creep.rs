@@ -95,13 +95,13 @@ impl Block for Creep {
         times.chain(self.gains.iter().map(|_| 1e-3)).collect()
     }
 
-    /// Creep follows the motion, and is smaller: the gains add up to more than nothing and less than 1. Lags of the other direction, which
+    /// Creep follows the motion, and is smaller: the gains add up to more than 1e-6 and less than 1. Lags of the other direction, which
     /// a fit may bring beside one that is hardly faster, are a small part.
     fn is_possible(&self) -> bool {
         /// Of the gains of the other direction over the whole. By hand.
         const AGAINST: f64 = 0.5;
-        /// Of all gains over that of G: less is no creep of a machine. Where G integrates, its gain in steady state has no limit, and any
-        /// lag beside it is less. By hand.
+        /// Least sum of the gains. Where G integrates, its gain in steady state is very large, and the gain of any lag beside it is
+        /// smaller than this. By hand: no machine creeps so little that a record shows it.
         const LEAST: f64 = 1e-6;
         let total: f64 = self.gains.iter().sum();
         let against: f64 = -self.gains.iter().filter(|gain| **gain < 0.0).sum::<f64>();

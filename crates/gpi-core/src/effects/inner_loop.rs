@@ -156,8 +156,8 @@ impl Law {
         matches!(self, Self::BoucWen { .. } | Self::Dahl { .. })
     }
 
-    /// Whether it is a spring with hysteresis: w follows a small change of z by as much.
-    pub(crate) fn is_spring(&self) -> bool {
+    /// Whether its force changes by as much as z right after z has reversed, as that of a spring does.
+    pub(crate) fn is_hysteretic_spring(&self) -> bool {
         matches!(self, Self::BoucWen { .. })
     }
 

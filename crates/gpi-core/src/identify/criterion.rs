@@ -121,14 +121,15 @@ impl<'a> Comparison<'a> {
     /// Refines a point that is no candidate yet as long as it gains, for starts that are far from where they lead.
     pub(super) fn settled(&self, point: Point, progress: Progress) -> Result<Point, Error> {
         let Self { prepared, options, fast, policy, .. } = self;
-        let mut settled = point;
-        let mut last = f64::INFINITY;
+        let (mut settled, mut last) = (point, f64::INFINITY);
         for _ in 0..policy.repeats {
-            let refined = joint(settled, prepared, options, f64::INFINITY, *fast, progress)?.fitted;
-            (settled, last) = match refined.linearization.cost {
-                cost if cost < (1.0 - policy.settled) * last => (refined.point, cost),
-                _ => return Ok(refined.point),
-            };
+            let fitted = joint(settled, prepared, options, f64::INFINITY, *fast, progress)?.fitted;
+            settled = fitted.point;
+            let gains = fitted.linearization.cost < (1.0 - policy.settled) * last;
+            if !gains {
+                break;
+            }
+            last = fitted.linearization.cost;
         }
         Ok(settled)
     }

@@ -7,6 +7,7 @@
 //!    Ho and Kalman's method (ERA), fits the hysteresis before it, and repeats this with v in place of u.
 //! 3. `structure` refines candidates jointly, from many plays and deadzones to few, then orders of G, each from the best
 //!    one so far; `criterion` compares them by a BIC for autocorrelated residuals.
+//!    A plant that is slow or integrates its input is also started from lags (`slow_plant`) or from its rate (`integrating_plant`).
 //! 4. The best one is simplified, and its uncertainty is computed.
 //!
 //! Of a long record, steps 2 and 3 see stretches only, see [`long_record`](super::long_record).

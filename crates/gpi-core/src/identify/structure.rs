@@ -238,10 +238,17 @@ impl<'a> StructureSearch<'a> {
         }
     }
 
-    /// Tries a point as it is, and new grids before its dynamics.
+    /// Tries new grids before the dynamics of a point, dead bands, and the point itself.
     pub(super) fn begin_at(&mut self, point: Point, progress: Progress) -> Result<(), Error> {
         self.climb(&point, progress)?;
-        self.dead_bands(&point, progress)?;
+        for band in self.dead_bands(&point) {
+            self.offer_settled(band, progress)?;
+        }
+        self.offer_settled(point, progress)
+    }
+
+    /// Tries a point that is fitted as long as it gains.
+    fn offer_settled(&mut self, point: Point, progress: Progress) -> Result<(), Error> {
         let settled = self.comparison.settled(point, progress);
         if let Ok(settled) = Error::unless_interrupted(settled)? {
             self.comparison.offer(settled, progress)?;
@@ -249,46 +256,38 @@ impl<'a> StructureSearch<'a> {
         Ok(())
     }
 
-    /// Tries dead bands about zero before the dynamics of a point, such as those of a valve's overlap or of a drive, where no grid is given.
-    fn dead_bands(&mut self, point: &Point, progress: Progress) -> Result<(), Error> {
+    /// Dead bands about zero before the dynamics of a point, such as those of a valve's overlap, of each input that has both signs. None
+    /// where grids are given.
+    fn dead_bands(&self, point: &Point) -> Vec<Point> {
+        let Comparison { prepared, policy, .. } = &self.comparison;
         let fewer = self.quick.map_or([false; 2], |quick| quick.fewer);
         let is_free = |(given, fewer): (&Option<Grid>, bool)| given.is_none() || fewer;
-        if ![&self.half_widths, &self.thresholds].into_iter().zip(fewer).all(is_free) {
-            return Ok(());
+        let are_free = [&self.half_widths, &self.thresholds].into_iter().zip(fewer).all(is_free);
+        let reach = |input: usize| {
+            let (low, high) = range(&prepared.record, input);
+            high.min(-low)
+        };
+        let bipolar: Vec<usize> =
+            (0..point.channels.len()).filter(|&input| reach(input) > 0.0).collect();
+        if !are_free || bipolar.is_empty() {
+            return Vec::new();
         }
-        let record = &self.comparison.prepared.record;
-        let reach = (0..record.inputs().len())
-            .map(|input| range(record, input))
-            .map(|(low, high)| high.min(-low))
-            .fold(f64::INFINITY, f64::min);
-        if reach <= 0.0 {
-            return Ok(());
-        }
-        let Comparison { prepared, policy, .. } = &self.comparison;
-        let bands: Vec<Point> = policy
-            .dead_bands
-            .iter()
-            .map(|part| {
-                let mut band = prepared.point(point.dynamics.clone());
-                band.offsets.clone_from(&point.offsets);
-                for (channel, own) in band.channels.iter_mut().zip(&point.channels) {
-                    let (elements, width) = (channel.elements, part * reach);
-                    let zones = vec![-width, width];
-                    let identity = Parameters::identity(channel.reading, zones, vec![0.0]);
-                    *channel = Parameters { elements, slopes: vec![0.0, 1.0, 1.0], ..identity };
-                    channel.weights[0] = own.weights.iter().sum();
-                }
-                prepared.settle(&mut band);
-                band
-            })
-            .collect();
-        for band in bands {
-            let settled = self.comparison.settled(band, progress);
-            if let Ok(settled) = Error::unless_interrupted(settled)? {
-                self.comparison.offer(settled, progress)?;
+        let band = |part: &f64| {
+            let mut band = prepared.point(point.dynamics.clone());
+            band.offsets.clone_from(&point.offsets);
+            band.channels.clone_from(&point.channels);
+            for &input in &bipolar {
+                let (own, width) = (&mut band.channels[input], part * reach(input));
+                let gain = own.weights.iter().sum();
+                let (elements, zones) = (own.elements, vec![-width, width]);
+                let identity = Parameters::identity(own.reading, zones, vec![0.0]);
+                let (slopes, weights) = (vec![0.0, 1.0, 1.0], vec![gain]);
+                *own = Parameters { elements, slopes, weights, ..identity };
             }
-        }
-        Ok(())
+            prepared.settle(&mut band);
+            band
+        };
+        policy.dead_bands.iter().map(band).collect()
     }
 
     /// Tries the best fit of all without the poles that rule it out: a lower order drops the weakest mode

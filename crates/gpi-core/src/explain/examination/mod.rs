@@ -4,8 +4,8 @@
 //! else. Before its effect is named it must also pass the following.
 //!
 //! 1. *Possible*: its values are such as a machine can have ([`Block::is_possible`]). G resonates if the effect acts inside a
-//!    mechanical loop, and a hysteretic force opposes the displacement. A hysteretic spring acts beside a linear one. A mode does not follow a line, creep or a disturbance ([`crate::fit::line_modes`],
-//!    [`crate::fit::memory`]).
+//!    mechanical loop, and a hysteretic force opposes the displacement. A hysteretic spring acts beside a linear one. A mode does not
+//!    follow a line, creep or a disturbance ([`crate::fit::line_modes`], [`crate::fit::memory`]).
 //! 2. *Not a longer fit*: the model without it, fitted again from where the trial ended, does worse by more than chance.
 //!
 //! More is asked of every effect when the search has ended. Before that, another effect that is not found yet would make
@@ -210,5 +210,5 @@ fn newest(point: &Point, name: &str) -> Option<usize> {
 /// Whether the stiffness of a hysteretic spring is more than `most` times the linear one: a force on a mass without a spring is friction.
 fn lacks_spring(point: &Point, inner: &InnerLoop, most: f64) -> bool {
     let force = point.steady_force(inner);
-    inner.law.is_spring() && force.is_some_and(|force| force.over_stiffness > most)
+    inner.law.is_hysteretic_spring() && force.is_some_and(|force| force.over_stiffness > most)
 }
