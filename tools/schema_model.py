@@ -248,7 +248,10 @@ PREDICTION = closed(
         "misfit": listed(size()),
         "movement": listed(size()),
     },
-    {"largest_misfit": listed(size(), "of the second in which it is largest")},
+    {
+        "expected_misfit": listed(size(), "the one that was found, or what the noise may hide"),
+        "largest_misfit": listed(size(), "of the second in which it is largest"),
+    },
     said="What the model knows about the errors of its simulations.",
 )
 MODEL = closed(

@@ -11,7 +11,8 @@
 //! ```
 //!
 //! The first two lines of variances are sensitivities along this drive: a parameter that the training data hardly show
-//! counts as much as this drive moves it. The misfit is what the residual of the training data contains beyond noise; it
+//! counts as much as this drive moves it. The misfit is what the residual of the training data contains beyond noise, or where
+//! it contains no more than noise, what the noise may hide ([`Prediction::expected_misfit`](crate::Prediction::expected_misfit)); it
 //! grows with the movement, and is larger on a drive that the model has not seen because the estimate has
 //! adapted to the training data.
 
@@ -157,7 +158,7 @@ impl Run<'_> {
     fn of_model(&self, settings: &ExpectationSettings) -> Option<Vec<f64>> {
         let prediction = self.model.prediction()?;
         let reference = self.scored(self.reference.clone());
-        let pairs = prediction.misfit.iter().zip(&prediction.movement);
+        let pairs = prediction.expected_misfit().iter().zip(&prediction.movement);
         let scaled = pairs.zip(reference.column_iter()).map(|((misfit, movement), reference)| {
             let own = reference.variance().sqrt();
             let share = if *movement > 0.0 { own / movement } else { 1.0 };
@@ -222,8 +223,14 @@ mod tests {
         // the numbers: threshold, slope, half-widths, weights, D, offset; axes of the first weight and of the offset
         let axes = vec![vec![0.01, 0.0], vec![0.0, 0.03]];
         let (misfit, movement) = (vec![0.02], vec![0.5]);
-        let prediction =
-            Prediction { numbers: vec![4, 7], axes, misfit, movement, largest_misfit: vec![] };
+        let prediction = Prediction {
+            numbers: vec![4, 7],
+            axes,
+            misfit,
+            expected_misfit: vec![],
+            movement,
+            largest_misfit: vec![],
+        };
         model.prediction = Some(prediction);
         let options =
             CompensateOptions { start: Some(Start::Input(vec![0.0])), ..Default::default() };

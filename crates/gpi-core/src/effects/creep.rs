@@ -211,6 +211,8 @@ mod tests {
         assert!(!is_possible(&[0.03, -0.02]));
         assert!(!is_possible(&[-0.03]));
         assert!(!is_possible(&[1.1]));
+        // the gain beside an integrator
+        assert!(!is_possible(&[1e-7]));
     }
 
     #[test]

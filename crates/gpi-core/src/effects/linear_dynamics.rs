@@ -66,6 +66,30 @@ impl LinearDynamics {
 /// From this damping on, a pair of poles hardly rings, and its response is like that of two lags: a quality factor of 1. By hand.
 const HARDLY_RINGS: f64 = 0.5;
 
+/// The poles in continuous time: `s = rate ln z`.
+enum Poles {
+    /// Natural frequency in rad/s, and damping.
+    Pair { natural: f64, damping: f64 },
+    /// Time constants in s.
+    Lags([f64; 2]),
+}
+
+impl LinearDynamics {
+    /// `None` unless the denominator has two coefficients.
+    fn poles(&self) -> Option<Poles> {
+        let [a1, a2] = self.denominator[..] else { return None };
+        let discriminant = 0.25 * a1 * a1 - a2;
+        if discriminant < 0.0 {
+            let (decay, angle) = (-0.5 * a2.ln(), (-0.5 * a1 / a2.sqrt()).acos());
+            let natural = decay.hypot(angle);
+            return Some(Poles::Pair { natural: self.rate * natural, damping: decay / natural });
+        }
+        let root = discriminant.sqrt();
+        let time = |pole: f64| -1.0 / (self.rate * pole.abs().max(f64::MIN_POSITIVE).ln());
+        Some(Poles::Lags([time(-0.5 * a1 + root), time(-0.5 * a1 - root)]))
+    }
+}
+
 impl Block for LinearDynamics {
     fn values(&self) -> Vec<f64> {
         [&self.denominator[..], &self.numerator[..]].concat()
@@ -84,38 +108,30 @@ impl Block for LinearDynamics {
 
     /// Whether its poles are faster than the lags of creep, or ring. A slow pair that hardly rings is a relaxation, which creep describes.
     fn is_plausible(&self, _: f64) -> bool {
-        let [a1, a2] = self.denominator[..] else { return true };
-        let discriminant = 0.25 * a1 * a1 - a2;
-        let (radius, damping) = if discriminant < 0.0 {
-            let (decay, angle) = (-0.5 * a2.ln(), (-0.5 * a1 / a2.sqrt()).acos());
-            (a2.sqrt(), decay / decay.hypot(angle))
-        } else {
-            (0.5 * a1.abs() + discriminant.sqrt(), 1.0)
-        };
-        -1.0 / radius.ln() <= longest_lag(self.rate) || damping < HARDLY_RINGS
+        let longest = longest_lag(self.rate) / self.rate;
+        match self.poles() {
+            Some(Poles::Pair { natural, damping }) => {
+                damping < HARDLY_RINGS || 1.0 / (natural * damping) <= longest
+            }
+            Some(Poles::Lags(times)) => times.iter().all(|&time| time <= longest),
+            None => true,
+        }
     }
 
     fn quantities(&self, units: Units) -> Vec<Quantity> {
-        let [a1, a2] = self.denominator[..] else { return Vec::new() };
-        let discriminant = 0.25 * a1 * a1 - a2;
-        let gain = self.numerator.iter().sum::<f64>() / (1.0 + a1 + a2);
-        let gain = Quantity::strength("static_gain", Units::ratio(units.output, units.input), gain);
-        let time = |pole: f64| -1.0 / (self.rate * pole.abs().max(f64::MIN_POSITIVE).ln());
-        if discriminant >= 0.0 {
-            let root = discriminant.sqrt();
-            let poles = [-0.5 * a1 + root, -0.5 * a1 - root];
-            let lag = |i: usize| Quantity::new(format!("time_constant[{i}]"), "s", time(poles[i]));
-            return vec![lag(0), lag(1), gain];
-        }
-        // s = rate ln z
-        let (radius, angle) = (a2.sqrt(), (-0.5 * a1 / a2.sqrt()).acos());
-        let decay = -radius.ln();
-        let natural = decay.hypot(angle);
-        vec![
-            Quantity::new("frequency", "Hz", self.rate * natural / std::f64::consts::TAU),
-            Quantity::new("damping", "", decay / natural),
-            gain,
-        ]
+        let Some(poles) = self.poles() else { return Vec::new() };
+        let gain =
+            self.numerator.iter().sum::<f64>() / (1.0 + self.denominator.iter().sum::<f64>());
+        let [first, second] = match poles {
+            Poles::Pair { natural, damping } => [
+                Quantity::new("frequency", "Hz", natural / std::f64::consts::TAU),
+                Quantity::new("damping", "", damping),
+            ],
+            Poles::Lags(times) => [0, 1]
+                .map(|i: usize| Quantity::new(format!("time_constant[{i}]"), "s", times[i])),
+        };
+        let unit = Units::ratio(units.output, units.input);
+        vec![first, second, Quantity::strength("static_gain", unit, gain)]
     }
 
     fn flaw(&self) -> Option<String> {

@@ -4,7 +4,8 @@
 //! why an effect that the input drives and that explains as much is preferred, and not the other way round. Two slow
 //! functions of time that act at different places of the chain can explain a part of each other's effect.
 //!
-//! Both rivals are fitted with the same number of steps. What is lost with the rival is counted on the training squares J of N values
+//! The rival is fitted alone with the linear parameters first, because the rest of the model was fitted beside the slow function and is
+//! nearly right; then everything is free, in both fits with the same number of steps. What is lost with the rival is counted on the training squares J of N values
 //! and on the held-out squares T of M values, as twice the loss of the log-likelihood of white Gaussian noise:
 //!
 //! ```text
@@ -13,7 +14,7 @@
 //!
 //! | rival | replaces the slow function where |
 //! |---|---|
-//! | a driven effect | `lost` < what the slow function must gain, `T_rival < f T`, plausible values |
+//! | a driven effect | `lost` < what the slow function must gain, `T_rival < f T`, plausible values, and what the slow function gained less `lost` is significant |
 //! | another slow function with q more unknowns | `lost + q ln N < -2 ln L`, L the number of looks ([`super::judgement`]) |
 //!
 //! The number of knots was chosen beside a model that did not fit yet. In both rivals, every second knot is therefore removed
@@ -25,7 +26,8 @@ use super::state::{Addition, SearchState, Trial};
 use super::trial::{ANY, measured, plausible_part, start, threshold};
 use crate::Error;
 use crate::Progress;
-use crate::chain::point::Point;
+use crate::chain::point::{DynamicsFreedom, Freedom, Point};
+use crate::chain::sensitivity::Derivatives;
 use crate::effects::{CATALOGUE, Entry, Signature};
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::progress::as_trial;
@@ -51,7 +53,8 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
         let start = start(state, &without, score)?;
         let options = longer(state, reach(state, threshold));
         let fitted = as_trial(progress, ("exchange", entry.name), (0, 1), |progress| {
-            let fitted = state.fit(start, &options, entry.name, progress)?;
+            let placed = state.fit(start, &held(&options), entry.name, progress)?;
+            let fitted = state.fit(placed.point, &options, entry.name, progress)?;
             match plausible_part(state, &fitted.point, entry) {
                 Some(part) => state.fit(part, &options, entry.name, progress),
                 None => Ok(fitted),
@@ -67,6 +70,7 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
         let trial = Trial { deviance: deviance - lost, ..trial };
         let factor = state.setup.policy.revision.driven_instead;
         if trial.is_driven
+            && trial.deviance > trial.threshold
             && state.is_plausible(&trial.point)
             && is_superfluous(lost, threshold, [&held_out, &trial.held_out], factor)
         {
@@ -124,6 +128,19 @@ fn coarser(point: &Point, slow: &Entry) -> Option<Point> {
 fn longer(state: &SearchState, goal: f64) -> FitOptions {
     let steps = state.setup.policy.revision.longer * state.setup.options.steps;
     FitOptions { steps, goal, ..state.setup.options.clone() }
+}
+
+/// Options of a fit of a rival before all is free. The rest was fitted beside the slow function, and is nearly right: freed at once, it
+/// would follow what the rival does not do yet.
+fn held(options: &FitOptions) -> FitOptions {
+    let freedom = Freedom {
+        derivatives: Derivatives::default(),
+        states: false,
+        identity: false,
+        dynamics: DynamicsFreedom::Nothing,
+        ..options.freedom
+    };
+    FitOptions { freedom, goal: ANY, ..options.clone() }
 }
 
 /// The training squares with which a rival loses twice a threshold. The factor leaves room for a rival whose held-out blocks are better,

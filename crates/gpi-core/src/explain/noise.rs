@@ -14,6 +14,8 @@
 //! model that lacks hysteresis or friction leaves an autocorrelated residual as well. It is called noise only if
 //!
 //! - no test of structure fails;
+//! - the output does not integrate the input: the error of a simulation is there the sum of all small forces that no model
+//!   knows, which is predicted by its past as noise with a long memory is;
 //! - s_w < (1 - p) s_e on the training data and, with the same a_i, on the held-out blocks;
 //! - s_w is near the noise floor, because the fast part of coloured noise is in its innovations;
 //! - s_e is near the noise floor, too, if the model has an effect that is a truncated expansion: the terms that it lacks
@@ -103,6 +105,9 @@ pub(super) fn memory(
     output: usize,
     floor: &NoiseFloor,
 ) -> Option<ColouredNoise> {
+    if matches!(state.integrates(), Ok(true)) {
+        return None;
+    }
     let policy = &state.setup.policy.noise;
     let colour = NoiseModel::of(residuals, &state.prepared.record);
     let filter = &colour.coefficients[output];

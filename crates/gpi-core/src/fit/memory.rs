@@ -216,6 +216,8 @@ mod tests {
         assert!(found(lags(0.0, &[(3.0, 0.995), (-2.0, 0.9925)])).concat().is_empty());
         // nor where the lag is a tenth of the record
         assert!(found(lags(0.0, &[(1.0, 0.9995)])).concat().is_empty());
+        // nor where the output integrates the input
+        assert!(found(lags(0.0, &[(1e4, 1.0 - 1e-8)])).concat().is_empty());
         // but a lag that has hardly moved anything is a disturbance, even if its gain is large
         let [_, wandering] = found(lags(0.5, &[(1.0, 0.9995)]));
         assert_eq!(wandering.len(), 1);

@@ -10,6 +10,16 @@
 //! over the numbers of lags L at which the mean exceeds twice its standard error; m is zero where none does. Coloured noise
 //! counts as misfit: the residual alone does not tell the two apart.
 //!
+//! A misfit that is not found may still be there, hidden by the noise. The mean `a` of `r(1) .. r(L)`, L the most lags, has a normal
+//! error of the standard deviation `s`, and var m is not negative. Without other knowledge, what is to be expected is the mean of this
+//! normal distribution beyond zero:
+//!
+//! ```text
+//! E[var m] = a + s phi(a / s) / Phi(a / s)
+//! ```
+//!
+//! with the density phi and the distribution function Phi of the standard normal distribution.
+//!
 //! The same is done for every piece of a second. So that noise alone makes no piece stand out among B of them, `sqrt(2 ln B)`
 //! more standard errors are asked for: the largest of B normal numbers is about so large.
 
@@ -18,11 +28,13 @@ use super::refinement::Refinement;
 use super::settings::MisfitSettings;
 use crate::chain::hysteresis::Parameters;
 use crate::{Error, Model, Record};
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-/// The misfit of each output and the movement of which it is a part, as root mean squares, and the misfit of the piece in
-/// which it is largest.
+/// The misfit of each output that is found, the one that is to be expected, and the movement of which they are a part, as root mean
+/// squares, and the misfit of the piece in which it is largest.
 pub(super) struct Misfit {
     pub misfit: Vec<f64>,
+    pub expected_misfit: Vec<f64>,
     pub movement: Vec<f64>,
     pub largest_misfit: Vec<f64>,
 }
@@ -33,6 +45,9 @@ struct Covariances {
     sums: Vec<f64>,
     count: f64,
 }
+
+/// Standard errors below zero at which an estimate of a square is cut off. By hand: chance alone does not lead there.
+const LEAST: f64 = 5.0;
 
 impl Covariances {
     fn new(settings: &MisfitSettings) -> Self {
@@ -47,15 +62,35 @@ impl Covariances {
         self.count += e.len() as f64;
     }
 
+    fn variance(&self) -> f64 {
+        self.sums[0] / self.count
+    }
+
+    /// The mean over so many lags, and its standard error for white noise.
+    fn mean(&self, lags: usize) -> (f64, f64) {
+        let mean = self.sums[1..=lags].iter().sum::<f64>() / (lags as f64 * self.count);
+        (mean, self.variance() / (self.count * lags as f64).sqrt())
+    }
+
     /// The mean square of the misfit, zero unless it exceeds so many standard errors.
     fn misfit(&self, lags: &[usize], standard_errors: f64) -> f64 {
-        let variance = self.sums[0] / self.count;
         let power = |&lags: &usize| {
-            let mean = self.sums[1..=lags].iter().sum::<f64>() / (lags as f64 * self.count);
-            let error = variance / (self.count * lags as f64).sqrt();
-            if mean > standard_errors * error { mean.min(variance) } else { 0.0 }
+            let (mean, error) = self.mean(lags);
+            if mean > standard_errors * error { mean.min(self.variance()) } else { 0.0 }
         };
         lags.iter().map(power).fold(0.0, f64::max)
+    }
+
+    /// The mean square of a misfit that is to be expected where none is found.
+    fn hidden(&self) -> f64 {
+        let (mean, error) = self.mean(self.sums.len() - 1);
+        if !(error > 0.0) {
+            return 0.0;
+        }
+        let (normal, a) = (Normal::standard(), mean / error);
+        // far below zero, the quotient of the two would be that of two zeros
+        let a = a.max(-LEAST);
+        (error * (a + normal.pdf(a) / normal.cdf(a))).clamp(0.0, self.variance())
     }
 }
 
@@ -76,8 +111,12 @@ impl Misfit {
             scored.experiments().iter().map(|e| driven.simulate(&e.input)).collect();
         let moved = moved?;
         let length = settings.samples.max((settings.seconds * record.rate()).round() as usize);
-        let (misfit, movement, largest_misfit) = (Vec::new(), Vec::new(), Vec::new());
-        let mut found = Self { misfit, movement, largest_misfit };
+        let mut found = Self {
+            misfit: Vec::new(),
+            expected_misfit: Vec::new(),
+            movement: Vec::new(),
+            largest_misfit: Vec::new(),
+        };
         for output in 0..model.outputs().len() {
             let mut covariances = Covariances::new(&settings);
             let mut pieces = Vec::new();
@@ -101,7 +140,10 @@ impl Misfit {
                 }
             }
             let errors = settings.standard_errors;
-            found.misfit.push(covariances.misfit(&settings.lags, errors).sqrt());
+            let misfit = covariances.misfit(&settings.lags, errors);
+            let expected = if misfit > 0.0 { misfit } else { covariances.hidden() };
+            found.misfit.push(misfit.sqrt());
+            found.expected_misfit.push(expected.sqrt());
             let errors = errors + (2.0 * (pieces.len().max(1) as f64).ln()).sqrt();
             let largest = pieces.iter().map(|own| own.misfit(&settings.lags, errors));
             found.largest_misfit.push(largest.fold(0.0, f64::max).sqrt());
@@ -113,6 +155,7 @@ impl Misfit {
 
 #[cfg(test)]
 mod tests {
+    use super::Covariances;
     use crate::identify::{IdentifyOptions, identify};
     use crate::linear::StateSpace;
     use crate::{Channel, Experiment, Matrix, Model, Prediction, Record};
@@ -172,6 +215,25 @@ mod tests {
         assert!((0.6..1.0).contains(&movement), "{movement}");
         let found = known(|_| 0.02).misfit()[0];
         assert!((found / (0.02 / 2.0_f64.sqrt()) - 1.0).abs() < 0.15, "{found}");
+    }
+
+    #[test]
+    fn a_misfit_that_the_noise_may_hide_is_expected() {
+        let found = known(|_| 0.02);
+        assert_eq!(found.expected_misfit(), found.misfit());
+        // white noise of variance 1: a mean of zero over 10 lags, and one of -2 and of +1 standard errors
+        let expected = |errors: f64| {
+            let mut noise = Covariances { sums: vec![0.0; 11], count: 4000.0 };
+            noise.sums[0] = 4000.0;
+            noise.sums[3] = 10.0 * 4000.0 * errors / 200.0;
+            noise.hidden() * 200.0
+        };
+        // the means of the normal distribution beyond zero: sqrt(2 / pi), phi(2) / Phi(-2) - 2, 1 + phi(1) / Phi(1)
+        for (errors, mean) in [(0.0, 0.797_885), (-2.0, 0.373_216), (1.0, 1.287_600)] {
+            assert!((expected(errors) - mean).abs() < 1e-5, "{errors}: {}", expected(errors));
+        }
+        assert!(expected(-50.0) > 0.0 && expected(-50.0) < 0.2);
+        assert_eq!(Covariances { sums: vec![0.0; 11], count: 4000.0 }.hidden(), 0.0);
     }
 
     #[test]

@@ -80,12 +80,13 @@ impl Model {
         let known = ("refinement", refinement.residuals.len());
         Error::require_equal("experiments", experiments, known)?;
         let Ok((numbers, axes)) = axes_of(&self, refinement, record) else { return Ok(self) };
-        let Misfit { misfit, movement, largest_misfit } =
+        let Misfit { misfit, expected_misfit, movement, largest_misfit } =
             match Misfit::of(&self, refinement, record) {
                 Err(Error::Diverged { .. }) => return Ok(self),
                 known => known?,
             };
-        let prediction = Prediction { numbers, axes, misfit, movement, largest_misfit };
+        let prediction =
+            Prediction { numbers, axes, misfit, expected_misfit, movement, largest_misfit };
         self.prediction = prediction.is_finite().then_some(prediction);
         Ok(self)
     }

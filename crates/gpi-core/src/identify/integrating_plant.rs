@@ -21,9 +21,6 @@ use crate::linear::{Sections, StateSpace};
 use crate::progress::Progress;
 use crate::{Error, Experiment, Matrix, Record};
 
-/// T over the length of the longest experiment. By hand: a part of 1e-4 of the movement is forgotten at the end, about as much as noise.
-const TIMES: f64 = 1e4;
-
 /// The hysteresis and the dynamics that the rate of the output shows, integrated; `None` where `estimate`, a first estimate, is not slow,
 /// or where a given order leaves nothing to the rate.
 pub(super) fn seed(
@@ -37,8 +34,9 @@ pub(super) fn seed(
     let outputs = prepared.record.outputs().len();
     let of_rate = options.order.map(|order| order.saturating_sub(outputs));
     let memory = Memory::of(&prepared.record);
+    let time = settings.slow.integrator * prepared.record.longest() as f64;
     let is_slow = memory.is_slow_plant(estimate, prepared)?;
-    if of_rate == Some(0) || !is_slow && !follows_integral(estimate, prepared)? {
+    if of_rate == Some(0) || !is_slow && !follows_integral(estimate, prepared, time)? {
         return Ok(None);
     }
     let rate = differences(&prepared.record)?;
@@ -62,7 +60,7 @@ pub(super) fn seed(
     // differences have most of their noise near half the rate, where a pole may follow it
     let found = found.without(|pole| memory.is_disturbance(pole))?.unwrap_or(found);
     let system = found.dynamics.to_state_space()?;
-    let system = integrated(&system, TIMES * prepared.record.longest() as f64)?;
+    let system = integrated(&system, time)?;
     let mut point = prepared.point(Sections::from_delayed_state_space(&system)?);
     point.channels = found.channels;
     rescale(&mut point);
@@ -71,10 +69,9 @@ pub(super) fn seed(
     Ok(Some(point))
 }
 
-/// Whether the integral of the inputs leaves less than an estimate.
-fn follows_integral(estimate: &Point, prepared: &Prepared) -> Result<bool, Error> {
+/// Whether the integrals of the inputs, lags of a time constant in samples, leave less than an estimate.
+fn follows_integral(estimate: &Point, prepared: &Prepared, time: f64) -> Result<bool, Error> {
     let (inputs, outputs) = (prepared.record.inputs().len(), prepared.record.outputs().len());
-    let time = TIMES * prepared.record.longest() as f64;
     let pole = (-1.0 / time).exp();
     let integrals = StateSpace::new(
         pole * Matrix::identity(inputs, inputs),

@@ -10,6 +10,7 @@
 
 mod alternation;
 mod criterion;
+mod dead_band;
 mod elements;
 mod entry;
 mod identification;

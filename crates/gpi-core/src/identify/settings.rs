@@ -79,6 +79,9 @@ settings! {
         ratio: f64 = 1.5, 1.01..=10.0;
         /// Stretches of scored samples that take part, the longest ones. By hand: each has an offset and a start of its own in every fit.
         stretches: usize = 16, FROM_ONE;
+        /// The time constant of a plant that integrates, over the length of the longest experiment. By hand: a part of 1e-4 of the
+        /// movement is forgotten at the end, about as much as noise. The joint fit moves it.
+        integrator: f64 = 1e4, FROM_ONE;
     }
 
     /// A gain with a delay.

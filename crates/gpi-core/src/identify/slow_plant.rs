@@ -38,7 +38,7 @@ pub(super) fn seed(
         return Ok(None);
     }
     let is_slow = memory.is_slow_plant(estimate, prepared)?;
-    let SlowPolicy { shortest, longest, ratio, stretches } = *policy;
+    let SlowPolicy { shortest, longest, ratio, stretches, .. } = *policy;
     let longest = longest * prepared.record.longest() as f64;
     let constants: Vec<f64> =
         std::iter::successors(Some(shortest), |constant| Some(ratio * constant))

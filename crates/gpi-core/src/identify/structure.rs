@@ -13,6 +13,7 @@ use crate::fit::smooth::smooth;
 use crate::fit::{Grid, RefineOptions};
 use crate::identify::alternation::{DynamicsEstimate, Taps};
 use crate::identify::criterion::Comparison;
+use crate::identify::dead_band::dead_bands;
 use crate::identify::identification::{Candidate, IdentifyOptions, Quick};
 use crate::identify::settings::{IdentifySettings, StructurePolicy};
 use crate::linear::Sections;
@@ -238,11 +239,16 @@ impl<'a> StructureSearch<'a> {
         }
     }
 
-    /// Tries new grids before the dynamics of a point, dead bands, and the point itself.
+    /// Tries new grids before the dynamics of a point, dead bands where no grid is given, and the point itself.
     pub(super) fn begin_at(&mut self, point: Point, progress: Progress) -> Result<(), Error> {
         self.climb(&point, progress)?;
-        for band in self.dead_bands(&point) {
-            self.offer_settled(band, progress)?;
+        let fewer = self.quick.map_or([false; 2], |quick| quick.fewer);
+        let is_free = |(given, fewer): (&Option<Grid>, bool)| given.is_none() || fewer;
+        if [&self.half_widths, &self.thresholds].into_iter().zip(fewer).all(is_free) {
+            let Comparison { prepared, policy, .. } = &self.comparison;
+            for band in dead_bands(prepared, &point, &policy.dead_bands) {
+                self.offer_settled(band, progress)?;
+            }
         }
         self.offer_settled(point, progress)
     }
@@ -254,40 +260,6 @@ impl<'a> StructureSearch<'a> {
             self.comparison.offer(settled, progress)?;
         }
         Ok(())
-    }
-
-    /// Dead bands about zero before the dynamics of a point, such as those of a valve's overlap, of each input that has both signs. None
-    /// where grids are given.
-    fn dead_bands(&self, point: &Point) -> Vec<Point> {
-        let Comparison { prepared, policy, .. } = &self.comparison;
-        let fewer = self.quick.map_or([false; 2], |quick| quick.fewer);
-        let is_free = |(given, fewer): (&Option<Grid>, bool)| given.is_none() || fewer;
-        let are_free = [&self.half_widths, &self.thresholds].into_iter().zip(fewer).all(is_free);
-        let reach = |input: usize| {
-            let (low, high) = range(&prepared.record, input);
-            high.min(-low)
-        };
-        let bipolar: Vec<usize> =
-            (0..point.channels.len()).filter(|&input| reach(input) > 0.0).collect();
-        if !are_free || bipolar.is_empty() {
-            return Vec::new();
-        }
-        let band = |part: &f64| {
-            let mut band = prepared.point(point.dynamics.clone());
-            band.offsets.clone_from(&point.offsets);
-            band.channels.clone_from(&point.channels);
-            for &input in &bipolar {
-                let (own, width) = (&mut band.channels[input], part * reach(input));
-                let gain = own.weights.iter().sum();
-                let (elements, zones) = (own.elements, vec![-width, width]);
-                let identity = Parameters::identity(own.reading, zones, vec![0.0]);
-                let (slopes, weights) = (vec![0.0, 1.0, 1.0], vec![gain]);
-                *own = Parameters { elements, slopes, weights, ..identity };
-            }
-            prepared.settle(&mut band);
-            band
-        };
-        policy.dead_bands.iter().map(band).collect()
     }
 
     /// Tries the best fit of all without the poles that rule it out: a lower order drops the weakest mode

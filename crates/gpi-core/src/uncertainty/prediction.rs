@@ -17,6 +17,9 @@ pub struct Prediction {
     pub(crate) axes: Vec<Vec<f32>>,
     /// Of each output, the root mean square error on the training data that the input drives, in its unit.
     pub(crate) misfit: Vec<f64>,
+    /// Of each output, the misfit that is to be expected, including one that the noise may hide; empty if it is not known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) expected_misfit: Vec<f64>,
     /// Of each output, the root mean square movement about its mean in the training data, in its unit.
     pub(crate) movement: Vec<f64>,
     /// Of each output, the misfit of that second of the training data in which it was largest; empty if it is not known.
@@ -28,6 +31,13 @@ impl Prediction {
     /// Of each output, the root mean square error on the training data that the input drives, in its unit.
     pub fn misfit(&self) -> &[f64] {
         &self.misfit
+    }
+
+    /// Of each output, the misfit that is to be expected, in its unit: the one that was found, or where none was found, the root of the
+    /// expected square of a misfit that the noise may hide. For a model that was saved by a version that did not determine it, the one
+    /// that was found.
+    pub fn expected_misfit(&self) -> &[f64] {
+        if self.expected_misfit.is_empty() { &self.misfit } else { &self.expected_misfit }
     }
 
     /// Of each output, the root mean square movement about its mean in the training data, in its unit.
@@ -43,9 +53,9 @@ impl Prediction {
 
     /// Whether every number is finite, as a file requires.
     pub(crate) fn is_finite(&self) -> bool {
-        let sizes = self.misfit.iter().chain(&self.movement).chain(&self.largest_misfit);
+        let sizes = [&self.misfit, &self.expected_misfit, &self.movement, &self.largest_misfit];
         self.axes.iter().flatten().all(|part| part.is_finite())
-            && sizes.into_iter().all(|value| value.is_finite())
+            && sizes.into_iter().flatten().all(|value| value.is_finite())
     }
 
     /// Refuses axes that are not those of a model of so many numbers and outputs.
@@ -63,9 +73,13 @@ impl Prediction {
         {
             Error::require_equal("outputs", (name, values.len()), outputs)?;
         }
-        if !self.largest_misfit.is_empty() {
-            let largest = ("prediction.largest_misfit", self.largest_misfit.len());
-            Error::require_equal("outputs", largest, outputs)?;
+        for (name, values) in [
+            ("prediction.expected_misfit", &self.expected_misfit),
+            ("prediction.largest_misfit", &self.largest_misfit),
+        ] {
+            if !values.is_empty() {
+                Error::require_equal("outputs", (name, values.len()), outputs)?;
+            }
         }
         Ok(())
     }

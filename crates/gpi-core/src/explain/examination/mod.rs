@@ -212,3 +212,57 @@ fn lacks_spring(point: &Point, inner: &InnerLoop, most: f64) -> bool {
     let force = point.steady_force(inner);
     inner.law.is_hysteretic_spring() && force.is_some_and(|force| force.over_stiffness > most)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::hysteresis::Parameters;
+    use crate::chain::point::Past;
+    use crate::effects::{Drives, Law, Sees, Stiffness};
+    use crate::linear::{Sections, TransferFunction};
+    use crate::operators::Reading;
+    use crate::{Intersample, Matrix};
+    use nalgebra::DVector;
+
+    /// A resonance of compliance 2, and a force of so much for each unit of the law that acts against the input.
+    fn point(law: Law, force: f64) -> Point {
+        let resonance = TransferFunction::new(&[0.3, 0.1], &[1.0, -1.6, 0.8]).unwrap();
+        let drives = Drives::Input { input: 0, force, states: 2 };
+        let loops = vec![InnerLoop { sees: Sees::Output(0), law, drives }];
+        Point {
+            pasts: vec![Past { plays: None, has_unknown_state: false, state: DVector::zeros(2) }],
+            channels: vec![Parameters::identity(Reading::OneSided, vec![0.0], vec![0.0])],
+            dynamics: Sections::from_state_space(&resonance.to_state_space().unwrap(), 0).unwrap(),
+            intersample: Intersample::default(),
+            effects: vec![Effect::from(Stiffness { loops })],
+            rate: 1e3,
+            offsets: vec![Matrix::zeros(1, 1)],
+        }
+    }
+
+    #[test]
+    fn a_hysteretic_spring_acts_beside_a_linear_one() {
+        let bouc_wen = Law::BoucWen { beta: 1.0, gamma: 0.5, exponent: 1.0 };
+        let dahl = Law::Dahl { distance: 0.1, averaged: false };
+        let lacks = |law: &Law, force: f64, most: f64| {
+            let point = point(law.clone(), force);
+            point.loops().all(|inner| lacks_spring(&point, inner, most))
+        };
+        // the stiffness is 2 x the force, over the linear one
+        assert!(lacks(&bouc_wen, 600.0, 1e3) && !lacks(&bouc_wen, 400.0, 1e3));
+        // friction has no stiffness of its own
+        assert!(!lacks(&dahl, 600.0, 1e3));
+    }
+
+    #[test]
+    fn a_hysteretic_force_opposes_the_displacement() {
+        let adds = |law: Law, force: f64| {
+            let point = point(law, force);
+            point.loops().all(|inner| adds_energy(&point, inner))
+        };
+        let dahl = || Law::Dahl { distance: 0.1, averaged: false };
+        assert!(adds(dahl(), -0.1) && !adds(dahl(), 0.1));
+        // a spring may soften
+        assert!(!adds(Law::Power { exponent: 3, scale: 1.0 }, -0.1));
+    }
+}
