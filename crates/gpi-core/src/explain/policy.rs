@@ -249,6 +249,8 @@ settings! {
         /// The residual's autocorrelation below this is negligible; lags are counted up to a part of the record.
         negligible: f64 = 0.05, PART;
         parts: usize = 4, FROM_ONE;
+        /// Part of the movement that lags slower than the knots of a function of time carry, at most: what creep does. By hand.
+        carried_by_lags: f64 = 0.25, PART;
         /// A function of time of fewer knots is a trend, whose gaps would be a large part of the record.
         fewest_knots: usize = 4, FROM_ONE;
         /// Length of a gap in spacings of the knots. Gaps of 3 spacings reject a true drift.

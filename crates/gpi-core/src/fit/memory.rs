@@ -112,18 +112,43 @@ impl Memory {
         if prepared.record.longest() < self.enough || point.dynamics.poles().iter().all(is_fast) {
             return Ok(false);
         }
-        let whole = point.dynamics.to_state_space()?;
-        let fast = point.dynamics.with_poles(is_fast).to_state_space()?;
-        let (mut at_once, mut all) = (0.0, 0.0);
-        for experiment in prepared.driven(point)?.experiments() {
-            let v = &experiment.input;
-            let moved =
-                Matrix::from_fn(v.nrows(), v.ncols(), |k, input| v[(k, input)] - v[(0, input)]);
-            at_once += fast.simulate(&moved)?.norm_squared();
-            all += whole.simulate(&moved)?.norm_squared();
-        }
-        Ok(at_once < self.at_once.powi(2) * all)
+        let [fast, _, all] = squares_moved(point, prepared, is_fast)?;
+        Ok(fast < self.at_once.powi(2) * all)
     }
+}
+
+/// The part of the movement that poles without resonance which are slower than a time constant in samples carry: `|S v| / |G v|`.
+pub(crate) fn part_of_slower(
+    longest: f64,
+    point: &Point,
+    prepared: &Prepared,
+) -> Result<f64, Error> {
+    let is_fast = |pole: &Complex<f64>| resonates(pole) || time_constant(pole) <= longest;
+    if point.dynamics.poles().iter().all(is_fast) {
+        return Ok(0.0);
+    }
+    let [_, slow, all] = squares_moved(point, prepared, is_fast)?;
+    Ok((slow / all.max(f64::MIN_POSITIVE)).sqrt())
+}
+
+/// The squares of what the fast part F of G and the rest of it, S, make of v, counted from its first sample, and of both together.
+fn squares_moved(
+    point: &Point,
+    prepared: &Prepared,
+    is_fast: impl Fn(&Complex<f64>) -> bool,
+) -> Result<[f64; 3], Error> {
+    let whole = point.dynamics.to_state_space()?;
+    let fast = point.dynamics.with_poles(is_fast).to_state_space()?;
+    let mut sums = [0.0; 3];
+    for experiment in prepared.driven(point)?.experiments() {
+        let v = &experiment.input;
+        let moved = Matrix::from_fn(v.nrows(), v.ncols(), |k, input| v[(k, input)] - v[(0, input)]);
+        let (fast, all) = (fast.simulate(&moved)?, whole.simulate(&moved)?);
+        sums[0] += fast.norm_squared();
+        sums[1] += (&all - fast).norm_squared();
+        sums[2] += all.norm_squared();
+    }
+    Ok(sums)
 }
 
 /// Whether a pole is that of a lag: real and positive.
@@ -208,6 +233,22 @@ mod tests {
         assert!(lag.len() == 1 && (lag[0].re - 0.995).abs() < 1e-9, "{lag:?}");
         assert_eq!(lag, all);
         assert!(found(lags(0.4, &[(0.5, 0.8)])).concat().is_empty());
+    }
+
+    #[test]
+    fn the_part_of_slower_poles_is_that_of_what_they_add() {
+        let record = record();
+        let prepared = prepare(&record, &IdentifyOptions::default()).unwrap();
+        let part = |longest: f64, dynamics| {
+            part_of_slower(longest, &prepared.point(dynamics), &prepared).unwrap()
+        };
+        // a lag of 200 samples, exp(-1 / 200), of a tenth beside 0.9 at once, at a sine of 628 samples
+        let creep = || lags(0.9, &[(0.1, (-1.0_f64 / 200.0).exp())]);
+        let own = part(100.0, creep());
+        assert!((0.03..0.07).contains(&own), "{own}");
+        assert_eq!(part(300.0, creep()), 0.0);
+        // a tank is nothing but its lag
+        assert_eq!(part(100.0, lags(0.0, &[(1.0, (-1.0_f64 / 200.0).exp())])), 1.0);
     }
 
     #[test]

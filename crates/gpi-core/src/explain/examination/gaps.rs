@@ -29,17 +29,21 @@
 use crate::chain::point::Point;
 use crate::effects::Block;
 use crate::explain::state::SearchState;
-use crate::fit::memory::time_constant;
-use crate::linear::resonates;
+use crate::fit::memory::part_of_slower;
 use crate::{Error, Experiment, Matrix, Record};
 use nalgebra::{Cholesky, DVector};
 
 /// Whether the function of time may follow what the dynamics lack. Knots at a distance h follow frequencies up to `1 / (2 h)`, and a
-/// pole without resonance of time constant T has its corner at `1 / (2 pi T)`: knots are as fast as it where `h < pi T`.
-pub(super) fn is_as_fast_as_lags(record: &Record, point: &Point, place: usize) -> bool {
-    let lags = point.dynamics.poles().into_iter().filter(|pole| !resonates(pole));
-    let longest = lags.map(|pole| time_constant(&pole)).fold(0.0, f64::max);
-    spacing(record, point, place) < std::f64::consts::PI * longest
+/// pole without resonance of time constant T has its corner at `1 / (2 pi T)`: knots are as fast as it where `h < pi T`. Such poles matter
+/// where they carry a part of the movement: a lag of little gain leaves little that knots could follow.
+pub(super) fn is_as_fast_as_lags(
+    state: &SearchState,
+    point: &Point,
+    place: usize,
+) -> Result<bool, Error> {
+    let longest = spacing(&state.prepared.record, point, place) / std::f64::consts::PI;
+    let carried = part_of_slower(longest, point, &state.prepared)?;
+    Ok(carried > state.setup.policy.examination.carried_by_lags)
 }
 
 /// The distance of the knots, in samples.

@@ -123,7 +123,7 @@ pub(super) fn doubt(
     {
         return Ok(Some(Refusal::NotItsOwn));
     }
-    if is_slow && gaps::is_as_fast_as_lags(&state.prepared.record, point, place) {
+    if is_slow && gaps::is_as_fast_as_lags(state, point, place)? {
         return Ok(Some(Refusal::AsFastAsLags));
     }
     if is_slow && gaps::are_missed(state, point, place)? {
