@@ -84,7 +84,7 @@ impl Covariances {
     /// The mean square of a misfit that is to be expected where none is found.
     fn hidden(&self) -> f64 {
         let (mean, error) = self.mean(self.sums.len() - 1);
-        if !(error > 0.0) {
+        if error == 0.0 || !error.is_finite() {
             return 0.0;
         }
         let (normal, a) = (Normal::standard(), mean / error);
