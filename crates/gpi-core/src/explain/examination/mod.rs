@@ -15,8 +15,8 @@
 //!    without it leaves more than the noise. The latter does not count for a slow function of time. A force inside the mechanics of a
 //!    stage that integrates its input is not asked: the error of a simulation is there the sum of all small forces. Nor are limits of
 //!    states, while the model is far from the noise: what they do is no small change of the rest.
-//! 4. *Slow*: a slow function of time is slower than the lags of G, and predicts gaps between its knots as well as it fits
-//!    ([`gaps`]).
+//! 4. *Slow*: a slow function of time is slower than the lags of G that carry a part of the movement, and predicts gaps between its
+//!    knots as well as it fits ([`gaps`]).
 //! 5. *Small, or at the noise*: an effect that is a large part of the output, acts a few times only, or acts like a misfit
 //!    of the hysteresis has brought the model near the noise ([`far_from_noise`]). Where it leaves much unexplained, it
 //!    follows another structure.
