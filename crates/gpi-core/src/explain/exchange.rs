@@ -4,8 +4,9 @@
 //! why an effect that the input drives and that explains as much is preferred, and not the other way round. Two slow
 //! functions of time that act at different places of the chain can explain a part of each other's effect.
 //!
-//! The rival is fitted alone with the linear parameters first, because the rest of the model was fitted beside the slow function and is
-//! nearly right; then everything is free, in both fits with the same number of steps. What is lost with the rival is counted on the training squares J of N values
+//! The rival is fitted twice, and the better fit counts: with everything free at once, and alone with the linear parameters first,
+//! because the rest of the model was fitted beside the slow function and may be nearly right. Both rivals are fitted with the same number of
+//! steps. What is lost with the rival is counted on the training squares J of N values
 //! and on the held-out squares T of M values, as twice the loss of the log-likelihood of white Gaussian noise:
 //!
 //! ```text
@@ -53,8 +54,11 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
         let start = start(state, &without, score)?;
         let options = longer(state, reach(state, threshold));
         let fitted = as_trial(progress, ("exchange", entry.name), (0, 1), |progress| {
-            let placed = state.fit(start, &held(&options), entry.name, progress)?;
-            let fitted = state.fit(placed.point, &options, entry.name, progress)?;
+            let placed = state.fit(start.clone(), &held(&options), entry.name, progress)?;
+            let placed = state.fit(placed.point, &options, entry.name, progress)?;
+            let at_once = state.fit(start, &options, entry.name, progress)?;
+            let is_better = placed.linearization.cost < at_once.linearization.cost;
+            let fitted = if is_better { placed } else { at_once };
             match plausible_part(state, &fitted.point, entry) {
                 Some(part) => state.fit(part, &options, entry.name, progress),
                 None => Ok(fitted),
