@@ -4,9 +4,9 @@
 //! why an effect that the input drives and that explains as much is preferred, and not the other way round. Two slow
 //! functions of time that act at different places of the chain can explain a part of each other's effect.
 //!
-//! The rival is fitted twice, and the better fit counts: with everything free at once, and alone with the linear parameters first,
-//! because the rest of the model was fitted beside the slow function and may be nearly right. Both rivals are fitted with the same number of
-//! steps. What is lost with the rival is counted on the training squares J of N values
+//! A driven rival is fitted twice, and the better fit counts: with everything free at once, and with grids and dynamics held first,
+//! because the rest of the model was fitted beside the slow function and may be nearly right. The last fit of both rivals has the same
+//! number of steps. What is lost with the rival is counted on the training squares J of N values
 //! and on the held-out squares T of M values, as twice the loss of the log-likelihood of white Gaussian noise:
 //!
 //! ```text
