@@ -129,6 +129,24 @@ def test_loops_that_open_with_speed_are_fitted_on_grids_that_move():
 
 
 @pytest.mark.slow
+def test_a_fit_that_ends_far_above_the_noise_begins_again_at_another_law():
+    # from the most promising exponent and knee, it ends at four times the noise
+    plant = plants.draw(1045, ("rate-dependence",), None, 30.0)
+    found = gpi.explain(record_of(plant.record(0)))
+    assert found.effects == ["rate-dependence"]
+    assert found.after["holdout"]["rms"] < 1.1 * plant.noise_std
+
+
+@pytest.mark.slow
+def test_a_spring_that_softens_up_to_a_limit_needs_no_second_name():
+    # its force is no cube: four powers of the displacement take the place of a hysteretic force
+    plant = plants.draw(1081, ("stiffness",), None, 30.0)
+    found = gpi.explain(record_of(plant.record(0)))
+    assert found.effects == ["stiffness"]
+    assert found.after["holdout"]["rms"] < 1.1 * plant.noise_std
+
+
+@pytest.mark.slow
 def test_an_effect_that_is_smaller_than_coloured_noise_is_named():
     # white noise of the same size would hide the sensor's curve; the past of this noise predicts most of it
     lacking = ("backlash", "coloured-noise", "output-nonlinearity")

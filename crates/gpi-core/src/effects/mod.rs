@@ -354,4 +354,37 @@ mod tests {
         ];
         findings.iter().for_each(|effect| agrees(effect, effect.entry()));
     }
+
+    #[test]
+    fn a_spring_goes_on_with_the_next_powers_and_with_its_damping() {
+        let entry = CATALOGUE.iter().find(|entry| entry.name == "stiffness").unwrap();
+        let inner =
+            |law| InnerLoop { sees: Sees::Output(0), law, drives: Drives::States(vec![0.1, 0.2]) };
+        // the exponents of each proposal, 0 for a damping
+        let proposed = |laws: &[Law]| -> Vec<Vec<i32>> {
+            let loops: Vec<InnerLoop> = laws.iter().cloned().map(inner).collect();
+            let mut found = Vec::new();
+            situation([-1.2, 0.6], |situation| {
+                let loops = loops.iter().collect();
+                let situation = Situation { loops, places: vec![], widest: vec![], ..*situation };
+                let exponent = |inner: &InnerLoop| match inner.law {
+                    Law::Power { exponent, .. } => exponent,
+                    _ => 0,
+                };
+                found.extend((entry.proposals)(&situation).into_iter().map(|one| {
+                    let closed = one.block.place().closed_loops().unwrap();
+                    closed.loops().iter().map(exponent).collect::<Vec<_>>()
+                }));
+            });
+            found.dedup();
+            found
+        };
+        let power = |exponent| Law::Power { exponent, scale: 1.0 };
+        let damping = Law::Damping { scale: 0.1 };
+        assert_eq!(proposed(&[]), [[2, 3]]);
+        assert_eq!(proposed(&[power(2), power(3)]), [vec![4, 5], vec![0]]);
+        assert_eq!(proposed(&[power(2), power(3), damping.clone()]), [[4, 5]]);
+        let all = [power(2), power(3), power(4), power(5), damping];
+        assert!(proposed(&all).is_empty());
+    }
 }

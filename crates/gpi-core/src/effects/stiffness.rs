@@ -4,7 +4,8 @@
 //! documentation's theory: `x+ = A x + B v + E w`, `w = law(S x + T v)`, see [`InnerLoop`].
 //!
 //! - Powers of the displacement are Duffing's oscillator (a cube) or a force that differs between the two
-//!   directions (a square).
+//!   directions (a square). Beside both, the next two powers are the start of another law, such as that of a spring that
+//!   softens up to a limit.
 //! - Stops are hysteresis inside the loop: the mechanics become softer and more damped as the amplitude
 //!   grows.
 //! - Beside powers, a force that grows with the speed up to a limit: damping that depends on the amplitude.
@@ -47,21 +48,25 @@ impl Stiffness {
         }
         if situation.outputs().len() == 1 {
             let has = |law: fn(&Law) -> bool| situation.loops.iter().any(|inner| law(&inner.law));
-            let has_powers = has(|law| matches!(law, Law::Power { .. }));
-            let is_damped = has(|law| matches!(law, Law::Damping { .. }));
-            return match (has_powers, is_damped) {
-                (false, _) => powers(situation),
-                (true, false) => damping(situation),
-                (true, true) => Vec::new(),
-            };
+            if !has(|law| matches!(law, Law::Power { .. })) {
+                return powers(situation, [2, 3]);
+            }
+            let mut more = Vec::new();
+            if !has(|law| matches!(law, Law::Power { exponent: 4.., .. })) {
+                more.extend(powers(situation, [4, 5]));
+            }
+            if !has(|law| matches!(law, Law::Damping { .. })) {
+                more.extend(damping(situation));
+            }
+            return more;
         }
         let families = families(situation).into_iter();
         families.flat_map(|(shape, signals)| around(shape, &signals, situation)).collect()
     }
 }
 
-/// A cube of the displacement alone, and a cube with a square.
-fn powers(situation: &Situation) -> Vec<Proposal<Stiffness>> {
+/// An odd power of the displacement alone, and with the even power below it.
+fn powers(situation: &Situation, exponents: [i32; 2]) -> Vec<Proposal<Stiffness>> {
     let order = situation.dynamics.order();
     // half the span of the displacement
     let scale = 0.5 * situation.span(0);
@@ -73,7 +78,7 @@ fn powers(situation: &Situation) -> Vec<Proposal<Stiffness>> {
         law: Law::Power { exponent, scale },
         drives: Drives::States(vec![0.0; order]),
     };
-    let block = Stiffness { loops: [2, 3].map(power).to_vec() };
+    let block = Stiffness { loops: exponents.map(power).to_vec() };
     [order..2 * order, 0..2 * order].map(|places| Proposal::linear(block.clone(), places)).to_vec()
 }
 

@@ -88,7 +88,7 @@ pub(super) fn forces(
         let start = Some(settle(point, entry.name, progress)?);
         let (columns, gain) = (forces.len(), own.explained);
         let score = Score { start: effect, zero: None, gain, columns };
-        found.push(Ranked { entry, score, worth: gain, start });
+        found.push(Ranked { entry, score, worth: gain, start, others: Vec::new() });
     }
     found.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
     Ok(found)

@@ -19,8 +19,9 @@
 //!    has, or of more of a driven effect that the model has already.
 //!
 //! Of the accepted trials the one with the largest deviance beyond its threshold is taken. Trials whose deviance lies
-//! within that threshold of its own explain the same: of these, one with plausible parameters is preferred, of functions of
-//! time one that is added to the output and gains nearly the same, and the others are reported as confounded.
+//! within that threshold of its own explain the same: of these, one with plausible parameters is preferred, more of a driven
+//! effect that the model has already to a new name, of functions of time one that is added to the output and gains nearly the same,
+//! and the others are reported as confounded.
 
 use super::policy::JudgementPolicy;
 use super::refusal::Refusal;
@@ -154,6 +155,9 @@ pub(super) fn choose(
     };
     let instead = trials.iter().position(measured_instead);
     let instead = instead.or_else(|| trials.iter().position(is_simpler));
+    // no new name where more of what is there explains the same
+    let is_no_new_name = |trial: &Evidence| trial.is_more && is_as_good(trial);
+    let instead = instead.or_else(|| trials.iter().position(is_no_new_name));
     Some(instead.or_else(|| trials.iter().position(is_as_good)).unwrap_or(best))
 }
 
@@ -408,6 +412,12 @@ mod tests {
         assert_eq!(refusal(&doubted, None, &policy), Refusal::NotItsOwn);
         let decay = Evidence { is_driven: false, ..equal };
         assert_eq!(refusal(&decay, Some(&best), &policy), Refusal::Undriven);
+        let more = Evidence { is_more: true, ..equal };
+        assert_eq!(choose(&[sound(), equal, more], 1.05, &policy), Some(2));
+        assert_eq!(
+            choose(&[sound(), Evidence { is_more: true, ..weaker }], 1.05, &policy),
+            Some(0)
+        );
     }
 
     #[test]

@@ -69,7 +69,8 @@ pub(super) fn limited(
     let start = best.point.effects[place].clone();
     let columns = start.values().len();
     let score = Score { start, zero: None, gain, columns };
-    Ok(Some(Ranked { entry, score, worth: gain, start: Some(best.point) }))
+    let start = Some(best.point);
+    Ok(Some(Ranked { entry, score, worth: gain, start, others: Vec::new() }))
 }
 
 /// An effect of an entry's kind with these loops, each of which keeps what it sees at the limit.

@@ -135,6 +135,11 @@ settings! {
         /// Where no effect promises this part of [`JudgementPolicy::least`], none is fitted: the score test promises
         /// too little, but hardly by more than that. By hand.
         hopeless: f64 = 0.5, PART;
+        /// Candidates of an effect, beside its best one, that its fit begins at where the model stays far above the noise, and
+        /// the part of the best one's gain that each promises. By hand: another exponent or time constant is often in reach of the
+        /// minimum where the most promising one is not.
+        others: usize = 2, 0.0..=1e3;
+        other: f64 = 0.5, PART;
         /// Where fits take long: the part of the best gain so far that the score test must promise. By hand.
         near: f64 = 0.5, PART;
         /// A slow function of time explains this part of what it does with a quarter of its knots. By hand.

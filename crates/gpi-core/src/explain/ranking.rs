@@ -38,6 +38,8 @@ pub(super) struct Ranked {
     pub worth: f64,
     /// The model to begin at, where that is not the present model with the effect.
     pub start: Option<Point>,
+    /// Other candidates of the effect that promise nearly as much, whose fits may end elsewhere.
+    pub others: Vec<Score>,
 }
 
 /// The best candidate of each effect that promises something, the most promising first.
@@ -81,7 +83,7 @@ pub(super) fn scored_beside(
         entries.resize(candidates.len(), entry);
     }
     let mut check = |done| report(progress, "score test", done);
-    let mut best = Vec::new();
+    let mut all = Vec::new();
     let scores = scores(&base, &candidates, &mut check)?;
     let policy = &state.setup.policy.ranking;
     let is_slow: Vec<bool> = (0..scores.len()).map(|i| is_slow(&scores, i, policy)).collect();
@@ -91,10 +93,28 @@ pub(super) fn scored_beside(
         }
         let deviance = promised(values, score.gain);
         let worth = deviance - score.columns as f64 * values.ln();
-        keep_best(&mut best, Ranked { entry, score, worth, start: None });
+        all.push(Ranked { entry, score, worth, start: None, others: Vec::new() });
     }
-    best.sort_by(|a: &Ranked, b| b.worth.total_cmp(&a.worth));
-    Ok(best)
+    all.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+    Ok(best_of_each(all, policy))
+}
+
+/// The first candidate of each effect, with those behind it that promise nearly as much. A fit that is linear in the values of the
+/// effect ends where it ends from any of them, so that only effects with a law of their own have others.
+fn best_of_each(all: Vec<Ranked>, policy: &RankingPolicy) -> Vec<Ranked> {
+    let mut best: Vec<Ranked> = Vec::new();
+    for one in all {
+        let Some(known) = best.iter_mut().find(|known| known.entry.name == one.entry.name) else {
+            best.push(one);
+            continue;
+        };
+        let has_law = one.score.start.values().len() > one.score.columns;
+        let is_near = one.score.gain > policy.other * known.score.gain;
+        if has_law && is_near && known.others.len() < policy.others {
+            known.others.push(one.score);
+        }
+    }
+    best
 }
 
 /// The deviance of taking a part of the squares of so many values.
@@ -112,18 +132,52 @@ fn is_slow(scores: &[Score], place: usize, policy: &RankingPolicy) -> bool {
     coarser.is_none_or(|coarser| coarser.gain > policy.slow * score.gain)
 }
 
-fn keep_best(best: &mut Vec<Ranked>, one: Ranked) {
-    match best.iter_mut().find(|known| known.entry.name == one.entry.name) {
-        Some(known) if known.worth < one.worth => *known = one,
-        Some(_) => {}
-        None => best.push(one),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::GainDrift;
+    use crate::effects::{CATALOGUE, Effect, GainDrift, RateDependence, SpeedLaw};
+
+    fn candidate(start: Effect, columns: usize, gain: f64) -> Ranked {
+        let entry = CATALOGUE.iter().find(|entry| entry.name == start.name()).unwrap();
+        let score = Score { start, zero: None, gain, columns };
+        Ranked { entry, score, worth: 1000.0 * gain, start: None, others: Vec::new() }
+    }
+
+    #[test]
+    fn an_effect_with_a_law_of_its_own_has_other_candidates_near_the_best_one() {
+        let law = |exponent: f64, gain: f64| {
+            let law = Some(SpeedLaw { exponent, knee: 1.0, lag: 0.0 });
+            let block = RateDependence {
+                input: 0,
+                relative: 0.0,
+                absolute: 0.0,
+                law,
+                speed: 1.0,
+                widest: 1.0,
+            };
+            candidate(block.into(), 2, gain)
+        };
+        let knots = |count: usize, gain: f64| {
+            let changes = vec![0.0; count];
+            candidate(GainDrift { output: 0, changes, duration: 1.0 }.into(), count, gain)
+        };
+        let all = vec![
+            law(0.4, 0.5),
+            knots(4, 0.45),
+            law(0.0, 0.4),
+            knots(2, 0.4),
+            law(-1.0, 0.3),
+            law(0.5, 0.28),
+            law(1.0, 0.1),
+        ];
+        let policy = RankingPolicy { others: 2, other: 0.5, ..RankingPolicy::default() };
+        let best = best_of_each(all, &policy);
+        let names: Vec<&str> = best.iter().map(|one| one.entry.name).collect();
+        assert_eq!(names, ["rate-dependence", "gain-drift"]);
+        let gains = |one: &Ranked| one.others.iter().map(|other| other.gain).collect::<Vec<_>>();
+        assert_eq!(gains(&best[0]), [0.4, 0.3]);
+        assert!(gains(&best[1]).is_empty(), "linear in all of its values");
+    }
 
     #[test]
     fn what_needs_all_its_knots_is_not_slow() {

@@ -15,7 +15,7 @@ use super::revision::{
 use super::sensor_range;
 use super::state::{Addition, Rejected, SearchState, Trial};
 use super::steps::finer_steps;
-use super::trial::{join_modes, trial, trials as trials_of};
+use super::trial::{from_others, join_modes, trial, trials as trials_of};
 use crate::Error;
 use crate::effects::{Entry, FreeOrder, Signature, Stage};
 use crate::fit::minimize::Fitted;
@@ -123,16 +123,20 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let mut names = BTreeSet::new();
     trials.retain(|trial| names.insert(trial.entry.name));
     let before = state.held_out(&state.point)?;
-    let noise = state.noise_squares()?;
-    let balanced: Vec<_> =
-        trials.iter().map(|trial| balanced(state, trial)).collect::<Result<_, _>>()?;
-    let mut evidences = trials
-        .iter()
-        .zip(&balanced)
-        .map(|(trial, balanced)| evidence(state, trial, noise, &before, balanced.as_ref()))
-        .collect::<Result<Vec<Evidence>, Error>>()?;
     let judgement = &state.setup.policy.judgement;
     let measured = state.setup.policy.examination.measured_instead;
+    if trials.iter().any(|trial| !trial.others.is_empty()) {
+        let balanced = balance(state, &trials)?;
+        let evidences = evidences(state, &trials, &before, &balanced)?;
+        let chosen = choose(&evidences, measured, judgement);
+        if let Some(place) = chosen
+            && let Some(better) = from_others(state, &trials[place], progress)?
+        {
+            trials[place] = better;
+        }
+    }
+    let balanced = balance(state, &trials)?;
+    let mut evidences = evidences(state, &trials, &before, &balanced)?;
     let mut better: Option<Fitted> = None;
     let taken = loop {
         let Some(place) = choose(&evidences, measured, judgement) else { break None };
@@ -190,6 +194,25 @@ fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     drop_superfluous(state, progress)?;
     straighten(state, progress)?;
     Ok(true)
+}
+
+/// What the balance of forces says of each trial.
+fn balance(state: &SearchState, trials: &[Trial]) -> Result<Vec<Option<Balanced>>, Error> {
+    trials.iter().map(|trial| balanced(state, trial)).collect()
+}
+
+/// Trials in numbers, with the held-out squares before them.
+fn evidences<'a>(
+    state: &SearchState,
+    trials: &'a [Trial],
+    before: &'a [f64],
+    balanced: &'a [Option<Balanced>],
+) -> Result<Vec<Evidence<'a>>, Error> {
+    let noise = state.noise_squares()?;
+    let pairs = trials.iter().zip(balanced);
+    pairs
+        .map(|(trial, balanced)| evidence(state, trial, noise, before, balanced.as_ref()))
+        .collect()
 }
 
 /// A trial in numbers, with the held-out squares before it.

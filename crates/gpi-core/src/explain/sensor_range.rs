@@ -85,5 +85,6 @@ pub(super) fn candidate(state: &SearchState) -> Result<Option<Ranked>, Error> {
     let gain = 1.0 - state.training_squares(start)? / state.cost;
     let columns = effect.values().len();
     let score = Score { start: effect.clone(), zero: None, gain, columns };
-    Ok(Some(Ranked { entry, score, worth: gain, start: Some(start.clone()) }))
+    let start = Some(start.clone());
+    Ok(Some(Ranked { entry, score, worth: gain, start, others: Vec::new() }))
 }

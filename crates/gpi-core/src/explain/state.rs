@@ -17,6 +17,7 @@
 
 use super::outside::integrates;
 use super::repair::{everything, repaired};
+use super::score::Score;
 use super::setup::SearchSetup;
 use crate::chain::point::Point;
 use crate::effects::{Effect, Entry};
@@ -55,6 +56,8 @@ pub(super) struct Trial {
     pub is_driven: bool,
     /// Whether its fit began far from the present model.
     pub is_far: bool,
+    /// Other candidates of the effect that the fit may begin at.
+    pub others: Vec<Score>,
 }
 
 /// An effect that was tried and not taken.

@@ -75,7 +75,7 @@ pub(super) fn trials(
 /// Fits the whole model with one more effect.
 pub(super) fn trial(
     state: &SearchState,
-    Ranked { entry, score, start: given, .. }: Ranked,
+    Ranked { entry, score, start: given, others, .. }: Ranked,
     progress: Progress,
 ) -> Result<Trial, Error> {
     let (gain, is_far) = (score.gain, given.is_some());
@@ -90,8 +90,47 @@ pub(super) fn trial(
         }
         None => fitted(state, start(state, &state.point, score)?, entry, ANY, progress)?,
     };
-    let trial = measured(state, &state.point, entry, fitted, options, gain, progress)?;
-    let trial = Trial { is_far, ..trial };
+    let trial = own(state, entry, fitted, options, gain, progress)?;
+    Ok(Trial { is_far, others, ..trial })
+}
+
+/// The best of the fits of a trial's effect that begin at its other candidates, where it is better than the trial. They are asked for as
+/// long as the model stays far above the noise.
+pub(super) fn from_others(
+    state: &SearchState,
+    trial: &Trial,
+    progress: Progress,
+) -> Result<Option<Trial>, Error> {
+    let enough = state.setup.policy.judgement.near_noise * state.noise_squares()?;
+    let (entry, mut best) = (trial.entry, None::<Trial>);
+    for (number, score) in trial.others.iter().enumerate() {
+        let goal = best.as_ref().map_or(trial.cost, |best| best.cost);
+        if goal <= enough || state.setup.is_long(&state.point) {
+            break;
+        }
+        let (gain, place) = (score.gain, (number, trial.others.len()));
+        let next = as_trial(progress, ("trials", entry.name), place, |progress| {
+            let start = start(state, &state.point, score.clone())?;
+            let (fitted, options) = fitted(state, start, entry, goal, progress)?;
+            let is_better = fitted.linearization.cost < goal;
+            is_better.then(|| own(state, entry, fitted, options, gain, progress)).transpose()
+        });
+        // the failure of one does not concern the others
+        best = Error::unless_interrupted(next)?.ok().flatten().or(best);
+    }
+    Ok(best)
+}
+
+/// What a fit of one more effect brought that is the effect's own.
+fn own(
+    state: &SearchState,
+    entry: &'static Entry,
+    fitted: Fitted,
+    options: FitOptions,
+    promised: f64,
+    progress: Progress,
+) -> Result<Trial, Error> {
+    let trial = measured(state, &state.point, entry, fitted, options, promised, progress)?;
     reached(progress, entry.name, (trial.cost / state.prepared.values()).sqrt())?;
     if entry.stage != Stage::Plays || trial.deviance <= trial.threshold {
         return Ok(trial);
@@ -211,7 +250,7 @@ pub(super) fn measured(
     let held_out = state.held_out(&point)?;
     let rms = state.rms(&point)?;
     let is_driven = is_driven(state, without, &point)?;
-    let is_far = false;
+    let (is_far, others) = (false, Vec::new());
     Ok(Trial {
         entry,
         point,
@@ -223,6 +262,7 @@ pub(super) fn measured(
         promised,
         is_driven,
         is_far,
+        others,
     })
 }
 
