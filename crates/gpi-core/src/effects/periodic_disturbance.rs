@@ -6,6 +6,7 @@
 use super::flaws::positive;
 use super::properties::{FreeOrder, SeparatedBy, Signature};
 use super::{Added, Block, Moment, Proposal, Quantity, Situation, Stage, Units};
+use crate::Matrix;
 use crate::spectrum::{Strongest, near, peak, power};
 
 /// A sinusoid is added: `y += a cos(2 pi f t) + b sin(2 pi f t)`.
@@ -82,9 +83,9 @@ fn outstanding(situation: &Situation, output: usize) -> Vec<f64> {
     const OUTSTANDING: f64 = 30.0;
     let longest = (0..situation.residuals.len()).max_by_key(|&i| situation.residuals[i].nrows());
     let Some(place) = longest else { return Vec::new() };
-    let residual = &situation.residuals[place];
-    let n = residual.nrows();
-    let power = power(residual.column(output).as_slice());
+    let residual = behind_warmup(situation, place, &situation.residuals[place], output);
+    let n = residual.len();
+    let power = power(&residual);
     let driven = driven(situation, place, output);
     let is_driven = |line: usize| driven[line] > power[line];
     let (mut best, mut strongest): (Option<(f64, usize)>, Option<usize>) = (None, None);
@@ -126,16 +127,20 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
     /// The error of the model over the displacement at a line, over the same for the whole signals, at most. By hand: an error
     /// may be larger at one line than on average.
     const CONCENTRATED: f64 = 3.0;
-    let displacement = situation.displacements[experiment].column(output);
-    let residual = situation.residuals[experiment].column(output);
-    let ratio = CONCENTRATED * (residual.variance() / displacement.variance()).sqrt();
-    let displacement = power(displacement.as_slice());
+    let of = |signals: &[Matrix], column| {
+        behind_warmup(situation, experiment, &signals[experiment], column)
+    };
+    let displacement = of(situation.displacements, output);
+    let residual = of(situation.residuals, output);
+    let ratio = CONCENTRATED * (variance(&residual) / variance(&displacement)).sqrt();
+    let displacement = power(&displacement);
     let count = displacement.len();
     let largest = |place: f64| displacement[near(place, count)].iter().copied().fold(0.0, f64::max);
     let part = ratio.clamp(0.0, 1.0).powi(2);
     let mut most: Vec<f64> = (0..count).map(|line| part * largest(line as f64)).collect();
-    if let [drive] = situation.drives[experiment].column_iter().collect::<Vec<_>>()[..]
-        && let Some(line) = Strongest::of(&power(drive.as_slice())).filter(|line| line.part > MOST)
+    if situation.drives[experiment].ncols() == 1
+        && let Some(line) = Strongest::of(&power(&of(situation.drives, 0)))
+        && line.part > MOST
     {
         let fundamental = largest(line.place);
         for n in 1..=(count as f64 / line.place) as usize {
@@ -146,6 +151,21 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
         }
     }
     most
+}
+
+/// A column of a signal of an experiment behind its warm-up: before it, the residual is what the unknown initial state leaves.
+fn behind_warmup(
+    situation: &Situation,
+    experiment: usize,
+    signal: &Matrix,
+    column: usize,
+) -> Vec<f64> {
+    let first = situation.record.experiments()[experiment].warmup;
+    signal.column(column).iter().skip(first).copied().collect()
+}
+
+fn variance(values: &[f64]) -> f64 {
+    nalgebra::DVectorView::from_slice(values, values.len()).variance()
 }
 
 impl Block for PeriodicDisturbance {
@@ -224,9 +244,14 @@ mod tests {
     use crate::{Channel, Experiment, Matrix, Record};
     use std::f64::consts::TAU;
 
-    /// The frequencies that are proposed where the displacement is a sine of 3 Hz and a weaker one of 7 Hz, both of changing size, and
-    /// the residual is white noise with sines of some frequencies and amplitudes.
+    /// The frequencies that are proposed where the displacement is a sine of 3 Hz and weaker ones of 7 Hz and 31 Hz, of changing size,
+    /// and the residual is white noise with sines of some frequencies and amplitudes.
     fn proposed(lines: &[(f64, f64)]) -> Vec<f64> {
+        proposed_behind(0, lines)
+    }
+
+    /// The same behind a warm-up of so many samples, in which an unknown initial state leaves a residual as large as the displacement.
+    fn proposed_behind(warmup: usize, lines: &[(f64, f64)]) -> Vec<f64> {
         let (rate, n) = (200.0, 6000);
         let time = |k: usize| k as f64 / rate;
         let mut random = 11.0;
@@ -235,7 +260,10 @@ mod tests {
             random / 2_147_483_647.0 - 0.5
         };
         let size = |k: usize| 1.0 + 0.3 * (TAU * 0.08 * time(k)).sin();
-        let sines = |k: usize| (TAU * 3.0 * time(k)).sin() + 0.4 * (TAU * 7.0 * time(k)).sin();
+        let sines = |k: usize| -> f64 {
+            let sine = |(frequency, size): (f64, f64)| size * (TAU * frequency * time(k)).sin();
+            [(3.0, 1.0), (7.0, 0.4), (31.0, 0.1)].into_iter().map(sine).sum()
+        };
         let u = Matrix::from_fn(n, 1, |k, _| size(k) * sines(k));
         let sum = |k: usize| -> f64 {
             let line = |(frequency, amplitude): &(f64, f64)| {
@@ -243,9 +271,10 @@ mod tests {
             };
             lines.iter().map(line).sum()
         };
-        let residuals = [Matrix::from_fn(n, 1, |k, _| sum(k) + 0.02 * noise())];
+        let start = |k: usize| if k < warmup { (0.9 * k as f64).sin() } else { 0.0 };
+        let residuals = [Matrix::from_fn(n, 1, |k, _| sum(k) + 0.02 * noise() + start(k))];
         let channel = |name| vec![Channel::new(name, "")];
-        let run = vec![Experiment::new(u.clone(), u.clone())];
+        let run = vec![Experiment { warmup, ..Experiment::new(u.clone(), u.clone()) }];
         let record = Record::new(run, rate, channel("u"), channel("y"), vec![]).unwrap();
         let signals = [u];
         let found = PeriodicDisturbance::proposals(&Situation {
@@ -271,6 +300,14 @@ mod tests {
         assert!(!is(&proposed(&[(3.0, 0.1)]), 3.0));
         // far more than the error that the rest has
         assert!(is(&proposed(&[(7.0, 0.5)]), 7.0));
+    }
+
+    #[test]
+    fn what_the_initial_state_leaves_is_no_error_of_the_model() {
+        for warmup in [0, 1500] {
+            let found = proposed_behind(warmup, &[(31.0, 0.05)]);
+            assert!((found[0] - 31.0).abs() < 0.01, "{found:?}");
+        }
     }
 
     #[test]
