@@ -4,6 +4,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,6 +21,10 @@ ALSO = {"duffing": "stiffness", "preisach": "hysteresis-shape"}
 REFUSED = "refused"
 # Held-out error over the noise up to which nothing is left to be named.
 ABSORBED = 1.05
+# Relative change of each output sample of a changed copy: far below any noise, and far above rounding.
+CHANGE = 1e-9
+# Seed of the changes, if copies are explained.
+COPY: ContextVar[int | None] = ContextVar("COPY", default=None)
 
 
 @dataclass(frozen=True)
@@ -96,6 +101,7 @@ def explained(
     may: tuple[str, ...] | None = None,
 ) -> Result:
     """Explain a record and score the model on another experiment of the same plant."""
+    record = copied(record)
     begin = time.perf_counter()
     found = gpi.explain(record)
     seconds = time.perf_counter() - begin
@@ -114,6 +120,33 @@ def explained(
         strength,
         may,
     )
+
+
+def copied(record: gpi.Record) -> gpi.Record:
+    """Return the record, or a copy whose outputs differ by `CHANGE` where a copy is wanted."""
+    seed = COPY.get()
+    if seed is None:
+        return record
+    random = np.random.default_rng(seed)
+    outputs = [y * (1.0 + CHANGE * random.standard_normal(y.shape)) for y in record.y]
+    return gpi.Record(
+        record.u,
+        outputs,
+        rate=record.rate,
+        covariates=record.covariates if record.covariate_names else None,
+        warmup=record.warmup,
+        input_units=record.input_units,
+        output_units=record.output_units,
+    )
+
+
+def of_copy(seed: int, function: Callable[..., Result], *values: object) -> Result:
+    """Explain a changed copy of a record. The answer should be that for the record itself."""
+    token = COPY.set(seed)
+    try:
+        return function(*values)
+    finally:
+        COPY.reset(token)
 
 
 def labelled(folder: Path, name: str) -> Result:

@@ -5,10 +5,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import gpi_hammerstein as gpi
 import score_tables
 import scoreboard
+import scores
 import textbook_tables
 from plants import textbook
 from scores import REFUSED, Result
@@ -135,6 +138,26 @@ TEXTBOOK = [
     of_stage("leak", 3, "covariate", "", 1.06),
     of_stage("leak", 4, "covariate", "drift", 1.0),
 ]
+
+
+def test_a_copy_differs_by_a_part_of_1e_9_and_is_kept_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(1)
+    record = gpi.Record(random.random(50), random.random(50), 10.0, covariates=random.random(50), warmup=3)
+    seen: list[gpi.Record] = []
+
+    def stage(number: int) -> Result:
+        seen.append(scores.copied(record))
+        return result("", "")
+
+    jobs = list(scoreboard.copies([(stage, (4,))], 7))
+    assert scoreboard.Kept.name(jobs[0]) == "of_copy 7 stage 4"
+    assert list(scoreboard.copies([(stage, (4,))], None)) == [(stage, (4,))]
+    for function, values in (*jobs, (stage, (4,))):
+        function(*values)
+    change = seen[0].y[0] / record.y[0] - 1.0
+    assert 1e-11 < np.abs(change).max() < 1e-8
+    assert np.array_equal(seen[0].covariates[0], record.covariates[0]) and seen[0].warmup == record.warmup
+    assert seen[1] is record
 
 
 def test_textbook_answers_are_right_false_or_missed() -> None:

@@ -5,6 +5,10 @@
 //! taken one after the other (orthogonal matching pursuit): the one that takes most of the squares, `s_i^2 / L_ii`,
 //! comes first, and is then projected off the others, `L -= L_i L_i' / L_ii` and `s -= s_i L_i / L_ii`.
 //!
+//! Half-widths move downhill from where they stand, and no play becomes two. Where the model has effects and stays above the noise, plays
+//! are therefore also chosen anew on a dense grid ([`crate::fit::dense`]), which the declared model is not given: so many plays can
+//! take the place of an effect that is not known yet.
+//!
 //! A strong candidate is fitted on the grids as they are, because finer ones would bend to what it explains. Before it is taken, finer
 //! grids are tried without it. It is superfluous where they lose less than its threshold.
 
@@ -19,6 +23,7 @@ use crate::chain::bounds::range;
 use crate::chain::free_run::Signals;
 use crate::chain::point::Point;
 use crate::effects::Stage;
+use crate::fit::dense::dense;
 use crate::fit::minimize::FitOptions;
 use crate::parallel::install;
 use crate::progress::{Progress, report};
@@ -69,7 +74,27 @@ pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Resul
             break;
         }
     }
-    Ok(gained)
+    Ok(choose_anew(state, progress)? || gained)
+}
+
+/// Chooses the plays anew on a dense grid, where the model has effects and stays above the noise; says whether it became better.
+fn choose_anew(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    let policy = &state.setup.policy.grid;
+    let is_at_noise = state.cost <= policy.at_noise * state.noise_squares()?;
+    let is_declared = state.point.effects.is_empty();
+    let is_held = !state.setup.moving.half_widths || state.setup.is_long(&state.point);
+    if is_at_noise || is_declared || is_held {
+        return Ok(false);
+    }
+    // a record too short for so many plays keeps those that it has
+    let chosen = dense(&state.point, &state.prepared, progress);
+    let Ok(chosen) = Error::unless_interrupted(chosen)? else { return Ok(false) };
+    let (point, cost) = on_moving_grids(state, chosen, progress)?;
+    let is_better = cost < (1.0 - policy.small) * state.cost;
+    if is_better {
+        (state.point, state.cost) = (point, cost);
+    }
+    Ok(is_better)
 }
 
 /// Takes finer grids where they explain as much as a trial: the effect is then superfluous beside them. Says whether they do.

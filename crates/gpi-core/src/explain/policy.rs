@@ -86,6 +86,8 @@ settings! {
         rounds: usize = 6, FROM_ONE;
         /// A round that lowers the squares by less than this part is the last: another one would gain less.
         small: f64 = 0.02, PART;
+        /// Squares over those of the noise up to which plays are not chosen anew on a dense grid: 5 % of the error. By hand.
+        at_noise: f64 = 1.1, FROM_ONE;
         /// Plays and deadzones that are added at once, before they are refined together. By hand.
         at_once: usize = 8, FROM_ONE;
         /// A play that would take a smaller part of the squares is not added: the search asks for 20 times as much
@@ -279,8 +281,8 @@ settings! {
         /// from the noise. On records of known truth false ones left 0.10 to 0.6, true forces of one element at most 0.042; sums
         /// of elements left up to 0.4 and are then not named.
         left: f64 = 0.05, PART;
-        /// The same of a gap that a force passes, and of creep. By hand: most of the squares are their own. A bank of stops with positive
-        /// weights cannot follow a gap.
+        /// The same of a gap that a force passes, and of creep; of the held-out squares, each of these effects leaves no more than this
+        /// part. By hand: most of the squares are their own. A bank of stops with positive weights cannot follow a gap.
         left_at_most: f64 = 0.5, PART;
         /// The same of a slow function of time: it must be three times what is left, because it can follow any slow error. By hand.
         left_by_slow: f64 = 0.1, PART;

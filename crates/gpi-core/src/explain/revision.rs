@@ -9,6 +9,7 @@
 //! | the hysteresis is superfluous beside a loop around G | `lost` < q ln N for its q parameters, and `T_without < f T_with`; or, far from the noise, `J_without <= (1 + f) J`, and `T_without <= (1 + f) T` |
 //! | a section of G without resonance is superfluous beside a loop | `J_without <= (1 + f) J`, and `T_without <= (1 + f) T` |
 //! | an added signal moves to the other side of the output stage | `J_moved < (1 - f) J` |
+//! | of an effect that later fits have made impossible, the plausible terms stay | `J_terms < (1 - f) J_without` |
 //! | a slow function of time is replaced | see [`super::exchange`] |
 //! | an effect replaces slow poles of G | `J_effect <= f J_poles` at the end of the search, else the poles return |
 //! | a mode of G that follows a line, or rings on, is taken out | always ([`crate::fit::line_modes`]) |
@@ -20,7 +21,7 @@
 use super::judgement::is_superfluous;
 use super::ranking::scored_beside;
 use super::state::{BeforeLags, SearchState};
-use super::trial::{fitted, start};
+use super::trial::{fitted, plausible_part, start};
 use crate::Error;
 use crate::Progress;
 use crate::effects::{Entry, FreeOrder, Place, Signature};
@@ -104,6 +105,25 @@ pub(super) fn straighten(state: &mut SearchState, progress: Progress) -> Result<
         (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
     }
     Ok(())
+}
+
+/// Keeps the plausible terms of an effect that later fits have made impossible, where they explain more than nothing; says whether it
+/// does.
+pub(super) fn keep_plausible(
+    state: &mut SearchState,
+    place: usize,
+    progress: Progress,
+) -> Result<bool, Error> {
+    let entry = state.point.effects[place].entry();
+    let Some(part) = plausible_part(state, &state.point, entry) else { return Ok(false) };
+    let fitted = state.fit(part, &state.setup.options, entry.name, progress)?;
+    let (_, without) = state.best_without(place, progress)?;
+    let cost = fitted.linearization.cost;
+    let is_more = cost < (1.0 - state.setup.policy.judgement.least) * without;
+    if is_more {
+        (state.point, state.cost) = (fitted.point, cost);
+    }
+    Ok(is_more)
 }
 
 /// Takes sections out of G that stood for what a loop does now: those that have no resonance, beside one that has.

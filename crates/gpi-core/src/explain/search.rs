@@ -10,7 +10,8 @@ use super::probability::probabilities;
 use super::ranking::{ranked, scored_beside};
 use super::refusal::Refusal;
 use super::revision::{
-    drop_superfluous, rearrange, settle_lags, shed_lags, shed_lines, shed_sections, straighten,
+    drop_superfluous, keep_plausible, rearrange, settle_lags, shed_lags, shed_lines, shed_sections,
+    straighten,
 };
 use super::sensor_range;
 use super::state::{Addition, Rejected, SearchState, Trial};
@@ -65,6 +66,10 @@ fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
             passed += 1;
             continue;
         };
+        if why == Refusal::Impossible && keep_plausible(state, place, progress)? {
+            passed = 0;
+            continue;
+        }
         let entry = state.point.effects[place].entry();
         let [_, holdout_rms] = state.rms(&state.point)?;
         state.remove(place, progress)?;

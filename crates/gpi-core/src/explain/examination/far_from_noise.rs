@@ -18,7 +18,8 @@
 //!   than a part of the squares of the balance of forces ([`crate::explain::force_balance`]);
 //! - a slow function of time, because it can follow any slow error, unless it leaves no more than a part of the squares of the best model
 //!   without it and the output does not integrate the input: an integral of errors is slow;
-//! - creep, and limits of states, unless they leave no more than a part of the squares of the best model without them;
+//! - creep, and limits of states, unless they leave no more than a part of the squares of the best model without them, as in all of
+//!   these cases also of the held-out squares;
 //! - a hysteretic force in such a loop that leaves more than a part of the squares of the best model without it, because it
 //!   resembles a hysteresis before the dynamics.
 //!
@@ -55,8 +56,12 @@ pub(super) fn doubt(
         return Ok(None);
     }
     let policy = &state.setup.policy.examination;
-    let mut leaves =
-        |part: f64| Ok::<bool, Error>(state.cost > part * state.best_without(place, progress)?.1);
+    let mut leaves = |part: f64| {
+        let (without, cost) = state.best_without(place, progress)?;
+        let held_out = |point| Ok::<f64, Error>(state.held_out(point)?.iter().sum());
+        let most = part.max(policy.left_at_most);
+        Ok::<bool, Error>(state.cost > part * cost || held_out(point)? > most * held_out(&without)?)
+    };
     if is_near(state, point)? {
         Ok(None)
     } else if exceedances(&of, &state.prepared.record).is_some_and(|n| n < policy.exceedances) {
