@@ -7,7 +7,8 @@
 //!    Of a record with one input and one output that is far from the noise, the balance of forces of a mass (`force_balance`) proposes forces
 //!    inside the mechanics as well, and the models at which their fits begin (`forces`). Where the output stands at a limit, the model of a
 //!    sensor that clips is a candidate (`sensor_range`).
-//! 3. The best few are fitted jointly with the whole model (`trial`). The one that explains most is accepted if it is
+//! 3. The best few are fitted jointly with the whole model (`trial`). The one that explains most begins again at its other candidates
+//!    if it leaves the model far above the noise (`restart`). It is accepted if it is
 //!    significant and the held-out blocks confirm it (`judgement`), and if what it does is its own
 //!    (`examination`). Effects that it makes superfluous are dropped (`revision`).
 //! 4. Steps 2 and 3 are repeated until no effect is accepted. Then an effect that the input drives replaces a slow
@@ -16,7 +17,7 @@
 //!
 //! The files import in one direction only: `policy` (every tolerance), `judgement`, `base`, `projection`,
 //! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `sensor_range`, `trial`,
-//! `examination`, `grid`, `revision`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
+//! `restart`, `examination`, `grid`, `revision`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
 
 pub(crate) mod base;
 mod blocks;
@@ -42,6 +43,7 @@ mod ranking;
 mod refusal;
 mod repair;
 mod residual;
+mod restart;
 mod revision;
 mod score;
 mod search;

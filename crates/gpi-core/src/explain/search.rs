@@ -9,6 +9,7 @@ use super::judgement::{Evidence, choose, judge, refusal};
 use super::probability::probabilities;
 use super::ranking::{ranked, scored_beside};
 use super::refusal::Refusal;
+use super::restart::from_others;
 use super::revision::{
     drop_superfluous, keep_plausible, rearrange, settle_lags, shed_lags, shed_lines, shed_sections,
     straighten,
@@ -16,7 +17,7 @@ use super::revision::{
 use super::sensor_range;
 use super::state::{Addition, Rejected, SearchState, Trial};
 use super::steps::finer_steps;
-use super::trial::{from_others, join_modes, trial, trials as trials_of};
+use super::trial::{join_modes, trial, trials as trials_of};
 use crate::Error;
 use crate::effects::{Entry, FreeOrder, Signature, Stage};
 use crate::fit::minimize::Fitted;

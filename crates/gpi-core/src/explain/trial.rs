@@ -94,35 +94,8 @@ pub(super) fn trial(
     Ok(Trial { is_far, others, ..trial })
 }
 
-/// The best of the fits of a trial's effect that begin at its other candidates, where it is better than the trial. They are asked for as
-/// long as the model stays far above the noise.
-pub(super) fn from_others(
-    state: &SearchState,
-    trial: &Trial,
-    progress: Progress,
-) -> Result<Option<Trial>, Error> {
-    let enough = state.setup.policy.judgement.near_noise * state.noise_squares()?;
-    let (entry, mut best) = (trial.entry, None::<Trial>);
-    for (number, score) in trial.others.iter().enumerate() {
-        let goal = best.as_ref().map_or(trial.cost, |best| best.cost);
-        if goal <= enough || state.setup.is_long(&state.point) {
-            break;
-        }
-        let (gain, place) = (score.gain, (number, trial.others.len()));
-        let next = as_trial(progress, ("trials", entry.name), place, |progress| {
-            let start = start(state, &state.point, score.clone())?;
-            let (fitted, options) = fitted(state, start, entry, goal, progress)?;
-            let is_better = fitted.linearization.cost < goal;
-            is_better.then(|| own(state, entry, fitted, options, gain, progress)).transpose()
-        });
-        // the failure of one does not concern the others
-        best = Error::unless_interrupted(next)?.ok().flatten().or(best);
-    }
-    Ok(best)
-}
-
-/// What a fit of one more effect brought that is the effect's own.
-fn own(
+/// What a fit of one more effect brought over the present model that is the effect's own.
+pub(super) fn own(
     state: &SearchState,
     entry: &'static Entry,
     fitted: Fitted,
