@@ -118,6 +118,10 @@ fn in_part<T: Send>(
     let begin = Instant::now();
     let result = py.detach(|| {
         let mut tell = |report: &Report| {
+            // work on several threads may report again before it stops: the signal is not forgotten
+            if raised.is_some() {
+                return false;
+            }
             let outcome = Python::attach(|py| {
                 py.check_signals()?;
                 let Some(function) = &progress else { return Ok(()) };

@@ -37,11 +37,16 @@ pub(super) fn concurrently<J: Send, T: Send>(
         for (place, Told { stage, trial, done, error }) in told {
             fractions[place] = done.max(fractions[place]);
             let done = fractions.iter().sum::<f64>() / fractions.len() as f64;
-            if !progress(&Report { stage: &stage, trial: &trial, done, error }) {
+            // what has been asked once is not asked again: jobs still report until their next step
+            if goes_on.load(Ordering::Relaxed)
+                && !progress(&Report { stage: &stage, trial: &trial, done, error })
+            {
                 goes_on.store(false, Ordering::Relaxed);
             }
         }
-        all.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        let results = all.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        // jobs that had no further step are not known to have been stopped
+        if goes_on.load(Ordering::Relaxed) { results } else { Err(Error::Interrupted) }
     })
 }
 
@@ -91,5 +96,21 @@ mod tests {
             Ok(())
         });
         assert!(matches!(endless, Err(Error::Interrupted)));
+    }
+
+    #[test]
+    fn a_stop_that_is_said_once_is_not_forgotten() {
+        let mut asked = 0;
+        let mut once = |_: &Report| {
+            asked += 1;
+            asked > 1
+        };
+        // jobs that end with their report
+        let ended = concurrently((0..20).collect(), &mut once, |job: usize, progress| {
+            let _ = crate::progress::report(progress, "last", 1.0);
+            Ok(job)
+        });
+        assert!(matches!(ended, Err(Error::Interrupted)));
+        assert_eq!(asked, 1);
     }
 }
