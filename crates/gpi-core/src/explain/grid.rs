@@ -6,8 +6,8 @@
 //! comes first, and is then projected off the others, `L -= L_i L_i' / L_ii` and `s -= s_i L_i / L_ii`.
 //!
 //! Half-widths move downhill from where they stand, and no play becomes two. Where the model has effects and stays above the noise, plays
-//! are therefore also chosen anew on a dense grid ([`crate::fit::dense`]), which the declared model is not given: so many plays can
-//! take the place of an effect that is not known yet.
+//! are therefore also chosen anew on a dense grid ([`crate::fit::dense`]), which the declared model is not given, nor one with a force inside
+//! the mechanics: so many plays can take the place of an effect that is not known yet.
 //!
 //! A strong candidate is fitted on the grids as they are, because finer ones would bend to what it explains. Before it is taken, finer
 //! grids are tried without it. It is superfluous where they lose less than its threshold.
@@ -83,7 +83,9 @@ fn choose_anew(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
     let is_at_noise = state.cost <= policy.at_noise * state.noise_squares()?;
     let is_declared = state.point.effects.is_empty();
     let is_held = !state.setup.moving.half_widths || state.setup.is_long(&state.point);
-    if is_at_noise || is_declared || is_held {
+    // so many plays take the place of a force inside the mechanics
+    let has_loops = state.point.loops().next().is_some();
+    if is_at_noise || is_declared || is_held || has_loops {
         return Ok(false);
     }
     // a record too short for so many plays keeps those that it has

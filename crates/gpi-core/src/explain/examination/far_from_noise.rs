@@ -24,7 +24,8 @@
 //!   resembles a hysteresis before the dynamics.
 //!
 //! Lines and measured columns are not asked, because no misfit resembles them, nor are modes, other loops and shapes of
-//! hysteresis loops, which may well be a large part.
+//! hysteresis loops, which may well be a large part. A shape of hysteresis loops is not named if the output integrates the input: small
+//! errors of v add up to a large one.
 
 use super::contribution::contribution;
 use crate::chain::point::Point;
@@ -52,6 +53,10 @@ pub(super) fn doubt(
             | Place::Output(_)
             | Place::Added(_)
     );
+    if let Place::Curves(_) = of {
+        let adds_up = state.integrates()? && !is_near(state, point)?;
+        return Ok(adds_up.then_some(Refusal::Integrates));
+    }
     if !is_asked || entry.signature == Signature::Unique || entry.free_order == FreeOrder::JoinsG {
         return Ok(None);
     }
