@@ -55,7 +55,7 @@ pub(super) fn doubt(
     );
     if let Place::Curves(_) = of {
         let adds_up = state.integrates()? && !is_near(state, point)?;
-        return Ok(adds_up.then_some(Refusal::Integrates));
+        return Ok(adds_up.then_some(Refusal::ResemblesMisfit));
     }
     if !is_asked || entry.signature == Signature::Unique || entry.free_order == FreeOrder::JoinsG {
         return Ok(None);
