@@ -140,7 +140,7 @@ TEXTBOOK = [
 ]
 
 
-def test_a_copy_differs_by_a_part_of_1e_9_and_is_kept_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_copy_differs_by_a_part_of_1e_9_and_is_kept_apart() -> None:
     random = np.random.default_rng(1)
     record = gpi.Record(random.random(50), random.random(50), 10.0, covariates=random.random(50), warmup=3)
     seen: list[gpi.Record] = []

@@ -153,7 +153,7 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
     most
 }
 
-/// A column of a signal of an experiment behind its warm-up: before it, the residual is what the unknown initial state leaves.
+/// A column of a signal of an experiment without its warm-up, in which the unknown initial state may leave a large residual.
 fn behind_warmup(
     situation: &Situation,
     experiment: usize,

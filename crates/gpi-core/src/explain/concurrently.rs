@@ -37,7 +37,7 @@ pub(super) fn concurrently<J: Send, T: Send>(
         for (place, Told { stage, trial, done, error }) in told {
             fractions[place] = done.max(fractions[place]);
             let done = fractions.iter().sum::<f64>() / fractions.len() as f64;
-            // what has been asked once is not asked again: jobs still report until their next step
+            // a stop is final: jobs may report again before they end
             if goes_on.load(Ordering::Relaxed)
                 && !progress(&Report { stage: &stage, trial: &trial, done, error })
             {

@@ -107,8 +107,8 @@ pub(super) fn straighten(state: &mut SearchState, progress: Progress) -> Result<
     Ok(())
 }
 
-/// Keeps the plausible terms of an effect that later fits have made impossible, where they explain more than nothing; says whether it
-/// does.
+/// Keeps the plausible terms of an effect that later fits have made impossible, where they remove as large a part of the squares as
+/// an effect must; says whether they stay.
 pub(super) fn keep_plausible(
     state: &mut SearchState,
     place: usize,
