@@ -230,6 +230,16 @@ def test_the_search_can_be_stopped_and_keeps_what_it_found():
     assert next(iter(in_words(found.to_dict()))).startswith("The search was stopped before it was complete")
 
 
+def test_a_wish_to_stop_at_the_last_report_is_not_lost():
+    def stop(now):
+        if now.done == 1.0:
+            raise KeyboardInterrupt
+
+    record = record_of(plants.draw(1, (), None, SECONDS, RATE).record(0))
+    choices = {"delay": 0, "half_widths": [0.0, 1.0], "thresholds": 0, "effects": []}
+    assert gpi.explain(record, **choices, progress=stop).interrupted
+
+
 def test_wrong_samples_are_told_however_few():
     plant = plants.draw(3, (), None, SECONDS, RATE)
     run = plant.record(0)

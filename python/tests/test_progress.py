@@ -1,5 +1,6 @@
 """The progress of long work: one fraction that never falls, the best error, lines, a bar, and Ctrl-C."""
 
+import json
 import os
 import pty
 import re
@@ -140,3 +141,9 @@ def test_ctrl_c_stops_within_a_second(command: str, tmp_path: Path) -> None:
     code, text, seconds = in_a_terminal([command, str(path)], stop_after=r"structures")
     assert code == 130, text[-500:]
     assert 0.0 < seconds < 2.0  # a second, and one for a machine with other work
+
+
+def test_ctrl_c_in_the_search_for_effects_keeps_what_is_found(tmp_path: Path) -> None:
+    code, text, _ = in_a_terminal(["demo", "-o", str(tmp_path / "out")], stop_after=r"score test")
+    assert code == 130, text[-500:]
+    assert json.loads((tmp_path / "out" / "demo.json").read_text())["explanation"]["interrupted"]

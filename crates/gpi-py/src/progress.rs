@@ -97,15 +97,16 @@ pub(crate) fn interruptible<T: Send>(
     }
 }
 
-/// The same for work that returns a partial result when it is stopped.
+/// The same for work that returns a partial result when it is stopped. The second value is whether it was, also where
+/// this came too late to change the result.
 pub(crate) fn interruptible_in_part<T: Send>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(gpi_core::Progress) -> Result<T, Error> + Send,
-) -> PyResult<T> {
+) -> PyResult<(T, bool)> {
     match in_part(py, progress, work) {
         (Err(Error::Interrupted), Some(exception)) => Err(exception),
-        (result, _) => result.map_err(to_python),
+        (result, exception) => Ok((result.map_err(to_python)?, exception.is_some())),
     }
 }
 

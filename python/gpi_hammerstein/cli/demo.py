@@ -30,11 +30,11 @@ DATA = files("gpi_hammerstein") / "data"
 RECORD, TRUTH = "demo.csv.gz", "demo.truth.json"
 
 
-def demo(out: options.Out = None, log: options.Log = False, as_json: options.Json = False) -> None:
+def demo(out: options.Out = None, log: options.Log = False, as_json: options.Json = False) -> int:
     """Run the complete workflow on a bundled record: identify, find missing effects, compare the errors.
 
     The record is from a simulated piezo stage with effects that the declared model does not contain. Writes
-    model.json, demo.json and pictures to DIR.
+    model.json, demo.json and pictures to DIR. Ctrl-C ends the search with what it has found.
     """
     with as_file(DATA / RECORD) as path:
         record = read_record(path)
@@ -55,6 +55,7 @@ def demo(out: options.Out = None, log: options.Log = False, as_json: options.Jso
         print_json(result)
     else:
         tell(console(), found, result, out)
+    return 130 if found.interrupted else 0
 
 
 def tell(screen: Console, found: Explanation, result: dict[str, Any], out: Path | None) -> None:

@@ -110,9 +110,11 @@ fn explain(
     let measured = &record.get().record;
     let holdout = holdout.as_ref().map(|other| &other.get().record);
     let on_another_record = holdout.is_some();
-    let mut found = interruptible_in_part(py, progress, |report| {
+    let (mut found, stopped) = interruptible_in_part(py, progress, |report| {
         core::explain(measured, holdout, &options, report)
     })?;
+    // at the last report the search was over, but the wish must not be lost
+    found.interrupted |= stopped;
     found.model = found.model.with_prediction(&found.refinement, measured).map_err(to_python)?;
     let refinement = Py::new(py, Refinement::new(&found.model, found.refinement.clone())?)?;
     Ok(Explanation { found, record, refinement, on_another_record })
