@@ -31,6 +31,10 @@ pub(super) enum Refusal {
     Saturates,
     /// It is a function of time whose knots are closer than a time constant of the dynamics.
     AsFastAsLags,
+    /// It is a function of time that changes when the motion of the input does.
+    FollowsInput,
+    /// A function of time that changes when the motion of the input does explains more.
+    Surpassed,
     /// It is a function of time that leaves much of an error that is far above the noise.
     FollowsTheRest,
     /// It is a limit that shows where the output stands at its limits only.
@@ -79,6 +83,10 @@ impl Refusal {
             Self::AsFastAsLags => {
                 "is a function of time that changes as fast as the dynamics, and may follow what they lack".to_owned()
             }
+            Self::FollowsInput => {
+                "is a function of time that follows how the input moves, so that the input causes what it explains".to_owned()
+            }
+            Self::Surpassed => "explains less than a function of time that follows how the input moves".to_owned(),
             Self::FollowsTheRest => {
                 "is a function of time that may follow what the model lacks: the error of the model would still be far above the noise".to_owned()
             }

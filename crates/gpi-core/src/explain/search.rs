@@ -73,6 +73,9 @@ fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
         }
         let entry = state.point.effects[place].entry();
         let [_, holdout_rms] = state.rms(&state.point)?;
+        if why == Refusal::FollowsInput {
+            state.follows_input = state.follows_input.min(holdout_rms);
+        }
         state.remove(place, progress)?;
         let why = why.in_words("the model");
         let (effect, confounded_with) = (entry.name, Vec::new());

@@ -121,6 +121,8 @@ pub(super) struct SearchState<'a> {
     pub last: Vec<Rejected>,
     /// What was taken and did not pass the last examination.
     pub refused: Vec<Rejected>,
+    /// The smallest held-out rms error with a slow function of time that follows the input's motion; infinite without one.
+    pub follows_input: f64,
     /// Names of the effects beside which the balance of forces was asked last.
     pub balanced_beside: Option<Vec<&'static str>>,
     /// Effects whose fits from the balance of forces ended far above the model.
@@ -144,6 +146,7 @@ impl<'a> SearchState<'a> {
             wrong: Vec::new(),
             last: Vec::new(),
             refused: Vec::new(),
+            follows_input: f64::INFINITY,
             balanced_beside: None,
             out_of_reach: BTreeSet::new(),
             integrates: OnceLock::new(),
@@ -164,6 +167,7 @@ impl<'a> SearchState<'a> {
             wrong: self.wrong.clone(),
             last: self.last.clone(),
             refused: self.refused.clone(),
+            follows_input: f64::INFINITY,
             balanced_beside: None,
             out_of_reach: self.out_of_reach.clone(),
             integrates: self.integrates.clone(),

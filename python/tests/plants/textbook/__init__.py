@@ -74,6 +74,7 @@ STAGES: dict[str, Stage] = {
     "log-creep": stage(slow.creep, must=["creep"], may=["linear-dynamics"], seconds=12),
     "thermal": stage(slow.thermal, must=["drift"], seconds=12),
     "gain": stage(slow.gain, must=["gain-drift"], seconds=12),
+    "self-heating": stage(slow.self_heating, seconds=12),
     "leak": stage(slow.leak, must=["covariate"], seconds=12),
     "lagged-leak": stage(slow.lagged_leak, must=["covariate"], seconds=12),
     "idle-columns": stage(slow.idle_columns, seconds=12),

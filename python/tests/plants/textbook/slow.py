@@ -85,6 +85,24 @@ def gain(random: Generator, drive: Drive) -> Run:
     return Run(drive.u, (1 + size * theta) * x + white(drive, rms), rms)
 
 
+def self_heating(random: Generator, drive: Drive) -> Run:
+    """An ordinary stage that the losses of its own drive warm, which changes its gain [1].
+
+    Every cycle of the drive loses energy, and the stage has a heat capacity: tau theta' = |dq/dt| - theta, q
+    the drive over its range, tau 0.4 to 2 s; y = (1 + g theta) x, g theta x 8 to 25 times the noise.
+
+    1. Zheng, Takahashi, Yoshikawa, Uchino, de Vries, Heat generation in multilayer piezoelectric actuators,
+       J. American Ceramic Society 79, 1996.
+    """
+    x = ordinary(random, drive)
+    rms = noise_rms(random, drive, 6e-5, 4e-4)
+    losses = np.abs(np.diff(drive.unit, prepend=drive.unit[0])) * drive.rate
+    theta = lag(losses, drive.rate, random.uniform(0.4, 2.0))
+    # x is about half the travel
+    size = random.uniform(16, 50) * rms / drive.travel
+    return Run(drive.u, (1 + size * drive.standardized(theta)) * x + white(drive, rms), rms)
+
+
 def leak(random: Generator, drive: Drive) -> Run:
     """Two slow columns are measured; the first leaks into the output, 6 to 25 times the noise."""
     x = ordinary(random, drive)

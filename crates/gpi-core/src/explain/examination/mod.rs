@@ -15,8 +15,9 @@
 //!    without it leaves more than the noise. The latter does not count for a slow function of time. A force inside the mechanics of a
 //!    stage that integrates its input is not asked: the error of a simulation is there the sum of all small forces. Nor are limits of
 //!    states, while the model is far from the noise: what they do is no small change of the rest.
-//! 4. *Slow*: a slow function of time is slower than the lags of G that carry a part of the movement, and predicts gaps between its
-//!    knots as well as it fits ([`gaps`]).
+//! 4. *Slow*: a slow function of time is slower than the lags of G that carry a part of the movement, predicts gaps between its
+//!    knots as well as it fits ([`gaps`]), and does not follow how the input moves ([`follows_input`]). Where one does, the input changes
+//!    the gain, and neither another one nor a shape of loops is named that leaves a larger error.
 //! 5. *Small, or at the noise*: an effect that is a large part of the output, acts a few times only, or acts like a misfit
 //!    of the hysteresis has brought the model near the noise ([`far_from_noise`]). Where it leaves much unexplained, it
 //!    follows another structure.
@@ -28,6 +29,7 @@
 
 mod contribution;
 mod far_from_noise;
+mod follows_input;
 mod gaps;
 mod own_part;
 mod within_limits;
@@ -128,6 +130,15 @@ pub(super) fn doubt(
     }
     if is_slow && gaps::are_missed(state, point, place)? {
         return Ok(Some(Refusal::Gaps));
+    }
+    let policy = &state.setup.policy.examination;
+    if is_slow && follows_input::follows_input(&state.prepared.record, point, place, policy) {
+        return Ok(Some(Refusal::FollowsInput));
+    }
+    // the gain of another shape of loops depends on their amplitude, too
+    let is_alike = is_slow || matches!(effect.place(), Place::Curves(_));
+    if is_alike && state.rms(point)?[1] >= state.follows_input {
+        return Ok(Some(Refusal::Surpassed));
     }
     far_from_noise::doubt(state, point, place, progress)
 }
