@@ -159,6 +159,24 @@ def test_plays_are_chosen_anew_beside_an_effect_that_is_found(seed, effects, mos
 
 
 @pytest.mark.slow
+def test_what_made_up_for_a_drift_is_dropped_with_it():
+    # creep takes the place of a drift, and then also explains what speed-dependent plays did beside it
+    plant = plants.draw(1116, ("creep",), None, 30.0)
+    found = gpi.explain(record_of(plant.record(0)))
+    assert found.effects == ["creep"]
+    assert found.after["holdout"]["rms"] < 1.02 * plant.noise_std
+
+
+@pytest.mark.slow
+def test_a_gain_that_past_peaks_change_does_not_drift():
+    plant = plants.draw(1109, ("peak-memory",), None, 30.0)
+    found = gpi.explain(record_of(plant.record(0)))
+    assert not found.effects
+    reasons = {one["effect"]: one["why"] for one in found.to_dict()["rejected"]}
+    assert "follows how the input moves" in reasons["gain-drift"]
+
+
+@pytest.mark.slow
 def test_an_effect_that_is_smaller_than_coloured_noise_is_named():
     # white noise of the same size would hide the sensor's curve; the past of this noise predicts most of it
     lacking = ("backlash", "coloured-noise", "output-nonlinearity")

@@ -18,11 +18,14 @@
 //! | a driven effect | `lost` < what the slow function must gain, `T_rival < f T`, plausible values, and what the slow function gained less `lost` is significant |
 //! | another slow function with q more unknowns | `lost + q ln N < -2 ln L`, L the number of looks ([`super::judgement`]) |
 //!
+//! A driven rival that has replaced a slow function is an addition, after which other effects may be superfluous ([`super::revision`]).
+//!
 //! The number of knots was chosen beside a model that did not fit yet. In both rivals, every second knot is therefore removed
 //! as long as that lowers the BIC. Superfluous knots would count as unknowns.
 
 use super::judgement::{Significance, is_superfluous};
 use super::ranking::{Ranked, scored_beside};
+use super::revision::drop_superfluous;
 use super::state::{Addition, SearchState, Trial};
 use super::trial::{ANY, measured, plausible_part, start, threshold};
 use crate::Error;
@@ -83,6 +86,8 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
             // the grids were placed, and the effect's terms counted, beside the slow function
             state.is_rich = false;
             is_replaced = true;
+            // others may have made up for what the slow function did not do
+            drop_superfluous(state, progress)?;
         }
     }
     Ok(is_replaced)
