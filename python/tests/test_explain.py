@@ -248,7 +248,7 @@ def test_the_search_can_be_stopped_and_keeps_what_it_found():
     assert next(iter(in_words(found.to_dict()))).startswith("The search was stopped before it was complete")
 
 
-def test_a_wish_to_stop_at_the_last_report_is_not_lost():
+def test_a_stop_at_the_last_report_is_not_lost():
     def stop(now):
         if now.done == 1.0:
             raise KeyboardInterrupt

@@ -34,7 +34,8 @@ def demo(out: options.Out = None, log: options.Log = False, as_json: options.Jso
     """Run the complete workflow on a bundled record: identify, find missing effects, compare the errors.
 
     The record is from a simulated piezo stage with effects that the declared model does not contain. Writes
-    model.json, demo.json and pictures to DIR. Ctrl-C ends the search with what it has found.
+    model.json, demo.json and pictures to DIR. Ctrl-C ends the search; what was found until then is
+    written.
     """
     with as_file(DATA / RECORD) as path:
         record = read_record(path)

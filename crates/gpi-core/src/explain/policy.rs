@@ -270,9 +270,8 @@ settings! {
         /// Rms error inside the gaps over that of the fit. On records of known truth, true functions of time have 1.00 to 1.12,
         /// most false ones 1.5 to 33.
         bridged: f64 = 1.25, FROM_ONE;
-        /// Probability with which a function of time that does not depend on the input may be said to follow its motion, for all tests
-        /// together. On simulated stages it is at most 3e-7 for gains that past peaks or the losses of the drive change, and at least 4e-3 for
-        /// true drifts.
+        /// Probability with which a function of time that does not depend on the input is said to follow its motion, for all tests
+        /// together. By hand: such an error should be much rarer than a true drift.
         followed: f64 = 1e-5, PART;
         /// Size beyond which an effect is large. On records of known truth false ones have 0.14 to 1.0. True ones that
         /// are large bring the held-out error within a factor of the noise.

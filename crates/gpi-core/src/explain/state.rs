@@ -167,6 +167,7 @@ impl<'a> SearchState<'a> {
             wrong: self.wrong.clone(),
             last: self.last.clone(),
             refused: self.refused.clone(),
+            // errors under another loss are not comparable
             follows_input: f64::INFINITY,
             balanced_beside: None,
             out_of_reach: self.out_of_reach.clone(),

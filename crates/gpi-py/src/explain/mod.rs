@@ -113,7 +113,7 @@ fn explain(
     let (mut found, stopped) = interruptible_in_part(py, progress, |report| {
         core::explain(measured, holdout, &options, report)
     })?;
-    // at the last report the search was over, but the wish must not be lost
+    // a stop that came with the last report has not changed the result, but the caller must know of it
     found.interrupted |= stopped;
     found.model = found.model.with_prediction(&found.refinement, measured).map_err(to_python)?;
     let refinement = Py::new(py, Refinement::new(&found.model, found.refinement.clone())?)?;
