@@ -16,12 +16,14 @@ SEEDS = (1000, 1001)
 # A slow error of the model is no coloured noise where the noise at rest is white.
 # Finer grids do what another shape of the hysteresis would. A gain does not drift faster than a tank fills.
 # A gain that the losses of the drive change does not drift.
+# Errors of the model at the turning points of the input are no coloured noise.
 # The overlap of a valve is a dead band of the declared model, and no friction.
 MORE = [
     *(("maxwell-slip", 1009), ("motor", 3002), ("lagged-leak", 1005), ("heater", 1003)),
     *(("clipped", 2000), ("tanks", 2002), ("tanks", 2004)),
     *(("hydraulic", 1001), ("hydraulic", 2004), ("hydraulic", 2005)),
     *(("maxwell-slip", 1002), ("self-heating", 1002), ("self-heating", 1003)),
+    ("gain", 1003),
 ]
 INTEGRATING = ("motor", "hydraulic")
 # Their lags outlast the impulse response that the record affords.

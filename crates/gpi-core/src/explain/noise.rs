@@ -22,7 +22,8 @@
 //!   leave a residual that follows the motion, in ways that no test need see;
 //! - s_e is near the noise at rest, or a small part of the output's span where the input never rests;
 //! - the kurtosis `mean(e^4) / mean(e^2)^2` is near 3, that of a stationary Gaussian process of any autocorrelation: an
-//!   error that comes in bursts while the stage moves has more.
+//!   error that comes in bursts while the stage moves has more. The same is asked of the part e - w that the past predicts, because the
+//!   white noise of the sensor hides such bursts in e.
 
 use super::policy::NoisePolicy;
 use super::residual::{ResidualTest, STRUCTURE};
@@ -142,8 +143,21 @@ pub(super) fn is_alone(
     let policy = &state.setup.policy.noise;
     let is_expanded = state.point.effects.iter().any(|effect| effect.entry().is_expansion);
     let is_remainder = is_expanded && noise.deviation > policy.innovation * floor.rms[noise.output];
-    let kurtosis = kurtosis(residuals, &state.prepared.record, noise.output);
-    !is_remainder && kurtosis <= policy.kurtosis
+    let record = &state.prepared.record;
+    let is_steady =
+        |residuals: &[Matrix]| kurtosis(residuals, record, noise.output) <= policy.kurtosis;
+    !is_remainder && is_steady(residuals) && is_steady(&predictable(residuals, noise))
+}
+
+/// The part of each residual that its own past predicts, `sum_i a_i e(k - i)` for all columns.
+fn predictable(residuals: &[Matrix], noise: &ColouredNoise) -> Vec<Matrix> {
+    let of = |residual: &Matrix| {
+        Matrix::from_fn(residual.nrows(), residual.ncols(), |k, column| {
+            let past = noise.coefficients.iter().zip((0..k).rev());
+            past.map(|(a, before)| a * residual[(before, column)]).sum()
+        })
+    };
+    residuals.iter().map(of).collect()
 }
 
 /// Standard deviations of a residual and of what its past does not predict.
@@ -194,6 +208,30 @@ mod tests {
         assert!((of(|_| 2.0) - 1.5).abs() < 0.01);
         let quarter = |k: usize| if k < 250 { 1.0 } else { 0.0 };
         assert!((of(quarter) - 6.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn white_noise_does_not_hide_bursts_that_the_past_predicts() {
+        // a slow sine in a tenth of the record, beside noise from a counter
+        let noise = |k: usize| ((k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64;
+        let own = |k: usize| if k % 1000 < 100 { (0.06 * k as f64).sin() } else { 0.0 };
+        let residual =
+            Matrix::from_fn(10_000, 1, |k, _| noise(k) / (1 << 24) as f64 - 0.5 + own(k));
+        let coefficients = vec![0.1; 10];
+        let colour = ColouredNoise { output: 0, coefficients, innovation: 1.0, deviation: 1.0 };
+        let (input, output, covariates) =
+            (residual.clone(), residual.clone(), Matrix::zeros(10_000, 0));
+        let run = crate::Experiment { input, output, covariates, warmup: 0, held_out: vec![] };
+        let channel = || vec![crate::Channel::new("a", "")];
+        let record = Record::new(vec![run], 1.0, channel(), channel(), vec![]).unwrap();
+        let residuals = [residual];
+        let most = NoisePolicy::default().kurtosis;
+        assert!(kurtosis(&residuals, &record, 0) < most);
+        let bursts = predictable(&residuals, &colour);
+        assert!(kurtosis(&bursts, &record, 0) > most);
+        // the mean of the ten samples before
+        let before: f64 = (40..50).map(|k| residuals[0][(k, 0)]).sum();
+        assert!((bursts[0][(50, 0)] - 0.1 * before).abs() < 1e-12);
     }
 
     #[test]
