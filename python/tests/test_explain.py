@@ -177,6 +177,16 @@ def test_a_gain_that_past_peaks_change_does_not_drift():
 
 
 @pytest.mark.slow
+def test_a_shape_of_loops_explains_more_than_a_function_of_time_that_is_refused():
+    # the gain depends on past peaks; knots follow that better than any shape, but do not predict gaps
+    plant = plants.draw(1179, ("peak-memory",), None, 30.0)
+    found = gpi.explain(record_of(plant.record(0)))
+    assert not found.effects
+    reasons = {one["effect"]: one["why"] for one in found.to_dict()["rejected"]}
+    assert "function of time that was refused" in reasons["hysteresis-shape"]
+
+
+@pytest.mark.slow
 def test_an_effect_that_is_smaller_than_coloured_noise_is_named():
     # white noise of the same size would hide the sensor's curve; the past of this noise predicts most of it
     lacking = ("backlash", "coloured-noise", "output-nonlinearity")

@@ -272,7 +272,7 @@ settings! {
         bridged: f64 = 1.25, FROM_ONE;
         /// Probability with which a function of time that does not depend on the input is said to follow its motion, for all tests
         /// together. By hand: such an error should be much rarer than a true drift.
-        followed: f64 = 1e-5, PART;
+        followed: f64 = 1e-4, PART;
         /// Size beyond which an effect is large. On records of known truth false ones have 0.14 to 1.0. True ones that
         /// are large bring the held-out error within a factor of the noise.
         large: f64 = 0.1, PART;

@@ -86,7 +86,7 @@ impl Refusal {
             Self::FollowsInput => {
                 "is a function of time that follows how the input moves, so that the input causes what it explains".to_owned()
             }
-            Self::Surpassed => "explains less than a function of time that follows how the input moves".to_owned(),
+            Self::Surpassed => "explains less than a function of time that was refused".to_owned(),
             Self::FollowsTheRest => {
                 "is a function of time that may follow what the model lacks: the error of the model would still be far above the noise".to_owned()
             }

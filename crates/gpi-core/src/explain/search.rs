@@ -73,8 +73,12 @@ fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
         }
         let entry = state.point.effects[place].entry();
         let [_, holdout_rms] = state.rms(&state.point)?;
-        if why == Refusal::FollowsInput {
-            state.follows_input = state.follows_input.min(holdout_rms);
+        match why {
+            Refusal::FollowsInput => {
+                state.follows_input = state.follows_input.min(holdout_rms);
+            }
+            Refusal::Gaps => state.misses_gaps = state.misses_gaps.min(holdout_rms),
+            _ => {}
         }
         state.remove(place, progress)?;
         let why = why.in_words("the model");

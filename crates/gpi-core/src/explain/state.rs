@@ -123,6 +123,8 @@ pub(super) struct SearchState<'a> {
     pub refused: Vec<Rejected>,
     /// The smallest held-out rms error with a slow function of time that follows the input's motion; infinite without one.
     pub follows_input: f64,
+    /// The same with one that does not predict gaps between its knots.
+    pub misses_gaps: f64,
     /// Names of the effects beside which the balance of forces was asked last.
     pub balanced_beside: Option<Vec<&'static str>>,
     /// Effects whose fits from the balance of forces ended far above the model.
@@ -147,6 +149,7 @@ impl<'a> SearchState<'a> {
             last: Vec::new(),
             refused: Vec::new(),
             follows_input: f64::INFINITY,
+            misses_gaps: f64::INFINITY,
             balanced_beside: None,
             out_of_reach: BTreeSet::new(),
             integrates: OnceLock::new(),
@@ -169,6 +172,7 @@ impl<'a> SearchState<'a> {
             refused: self.refused.clone(),
             // errors under another loss are not comparable
             follows_input: f64::INFINITY,
+            misses_gaps: f64::INFINITY,
             balanced_beside: None,
             out_of_reach: self.out_of_reach.clone(),
             integrates: self.integrates.clone(),

@@ -10,7 +10,8 @@
 //!
 //! taken at the knots, r is the correlation of the second differences of g and of f. Those of a smooth g are hardly more than the errors of
 //! its estimate, which do not depend on the input, so that `t = r sqrt((n - 2) / (1 - r^2))` of n differences has Student's distribution
-//! with n - 2 degrees of freedom. Values or first differences of slow curves are correlated by chance.
+//! with n - 2 degrees of freedom. Values or first differences of slow curves are correlated by chance. The value at the first sample is
+//! zero by definition and is left out: where the output begins at zero, the data do not determine the gain there.
 
 use crate::Record;
 use crate::chain::point::Point;
@@ -33,16 +34,15 @@ pub(super) fn follows_input(
     let mut chances = Vec::new();
     for experiment in record.experiments() {
         let rows = experiment.input.nrows();
-        let inside = 1 + (rows as f64 / spacing).round() as usize;
-        let values: Vec<f64> =
-            std::iter::once(0.0).chain(later.iter().copied()).take(inside).collect();
+        let inside = (rows as f64 / spacing).round() as usize;
+        let values: Vec<f64> = later.iter().copied().take(inside).collect();
         for column in experiment.input.column_iter() {
             let u: Vec<f64> = column.iter().copied().collect();
             for motion in motions(&u) {
                 for memory in MEMORIES {
                     let recent = recent(&motion, memory * spacing);
                     let at = |j: usize| recent[((j as f64 * spacing) as usize).min(rows - 1)];
-                    let known: Vec<f64> = (0..values.len()).map(at).collect();
+                    let known: Vec<f64> = (1..=values.len()).map(at).collect();
                     chances.extend(chance(&bends(&values), &bends(&known)));
                 }
             }

@@ -113,6 +113,11 @@ pub(super) fn doubt(
         return Ok(Some(Refusal::Saturates));
     }
     let is_slow = point.effects[place].entry().signature == Signature::SlowInTime;
+    // asked first, because the answer also concerns other effects
+    let policy = &state.setup.policy.examination;
+    if is_slow && follows_input::follows_input(&state.prepared.record, point, place, policy) {
+        return Ok(Some(Refusal::FollowsInput));
+    }
     // where the output integrates the input, forces are judged by their balance
     let is_balanced =
         matches!(point.effects[place].place(), Place::Loops(_)) && state.integrates()?;
@@ -131,13 +136,13 @@ pub(super) fn doubt(
     if is_slow && gaps::are_missed(state, point, place)? {
         return Ok(Some(Refusal::Gaps));
     }
-    let policy = &state.setup.policy.examination;
-    if is_slow && follows_input::follows_input(&state.prepared.record, point, place, policy) {
-        return Ok(Some(Refusal::FollowsInput));
-    }
     // the gain of another shape of loops depends on their amplitude, too
-    let is_alike = is_slow || matches!(effect.place(), Place::Curves(_));
-    if is_alike && state.rms(point)?[1] >= state.follows_input {
+    let least = match effect.place() {
+        Place::Curves(_) => state.follows_input.min(state.misses_gaps),
+        _ if is_slow => state.follows_input,
+        _ => f64::INFINITY,
+    };
+    if state.rms(point)?[1] >= least {
         return Ok(Some(Refusal::Surpassed));
     }
     far_from_noise::doubt(state, point, place, progress)
