@@ -168,6 +168,15 @@ def test_what_made_up_for_a_drift_is_dropped_with_it():
 
 
 @pytest.mark.slow
+def test_creep_is_named_where_it_hides_in_slow_poles_beside_a_force():
+    # a drift and two lags of G follow the creep at first
+    plant = plants.draw(1098, ("covariate", "stiffness", "creep"), None, 30.0)
+    found = gpi.explain(record_of(plant.record(0)))
+    assert set(found.effects) == {"covariate", "stiffness", "creep"}
+    assert found.after["holdout"]["rms"] < 1.02 * plant.noise_std
+
+
+@pytest.mark.slow
 def test_a_gain_that_past_peaks_change_does_not_drift():
     plant = plants.draw(1109, ("peak-memory",), None, 30.0)
     found = gpi.explain(record_of(plant.record(0)))

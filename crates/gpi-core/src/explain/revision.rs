@@ -208,12 +208,7 @@ pub(super) fn shed_lines(state: &mut SearchState, progress: Progress) -> Result<
         let rings_on = pole.im != 0.0 && memory.is_disturbance(pole);
         rings_on || lines.iter().any(|line| is_same(line, pole))
     };
-    let point = if state.point.loops().next().is_some() {
-        state.point.without_sections(is_line)
-    } else {
-        state.point.without(is_line)?
-    };
-    let Some(point) = point else { return Ok(false) };
+    let Some(point) = state.point.without(is_line)? else { return Ok(false) };
     let fitted = state.fit(point, &state.setup.options, "lines", progress)?;
     (state.point, state.cost) = (fitted.point, fitted.linearization.cost);
     state.left.clear();

@@ -162,14 +162,17 @@ pub(crate) fn time_constant(pole: &Complex<f64>) -> f64 {
 }
 
 impl Point {
-    /// The same without poles of G; `None` where it has no such poles, or none else.
+    /// The same without poles of G; `None` where it has no such poles, or none else. Beside loops, which act on the states of its
+    /// sections, whole sections are taken out, and poles that share one with others stay.
     pub(crate) fn without(
         &self,
         unwanted: impl Fn(&Complex<f64>) -> bool,
     ) -> Result<Option<Self>, Error> {
+        if self.loops().next().is_some() {
+            return Ok(self.without_sections(unwanted));
+        }
         let own = &self.dynamics;
-        // loops act on the states of G, which would be others
-        if !own.poles().iter().any(&unwanted) || self.loops().next().is_some() {
+        if !own.poles().iter().any(&unwanted) {
             return Ok(None);
         }
         let whole = Sections::from_delayed_state_space(&own.to_state_space()?)?;
