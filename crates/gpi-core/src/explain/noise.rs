@@ -214,7 +214,7 @@ mod tests {
     fn white_noise_does_not_hide_bursts_that_the_past_predicts() {
         // a slow sine in a tenth of the record, beside noise from a counter
         let noise = |k: usize| ((k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64;
-        let own = |k: usize| if k % 1000 < 100 { (0.06 * k as f64).sin() } else { 0.0 };
+        let own = |k: usize| if k % 1000 < 100 { 0.6 * (0.06 * k as f64).sin() } else { 0.0 };
         let residual =
             Matrix::from_fn(10_000, 1, |k, _| noise(k) / (1 << 24) as f64 - 0.5 + own(k));
         let coefficients = vec![0.1; 10];
