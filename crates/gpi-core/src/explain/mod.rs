@@ -17,7 +17,7 @@
 //!
 //! The files import in one direction only: `policy` (every tolerance), `judgement`, `base`, `projection`,
 //! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `sensor_range`, `trial`,
-//! `restart`, `examination`, `grid`, `revision`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
+//! `restart`, `examination`, `grid`, `revision`, `round`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
 
 pub(crate) mod base;
 mod blocks;
@@ -45,6 +45,7 @@ mod repair;
 mod residual;
 mod restart;
 mod revision;
+mod round;
 mod score;
 mod search;
 mod sensor_range;
