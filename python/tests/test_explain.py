@@ -186,7 +186,7 @@ def test_a_gain_that_past_peaks_change_does_not_drift():
 
 
 @pytest.mark.slow
-def test_a_shape_of_loops_explains_more_than_a_function_of_time_that_is_refused():
+def test_no_shape_of_loops_that_explains_less_than_a_refused_function_of_time():
     # the gain depends on past peaks; knots follow that better than any shape, but do not predict gaps
     plant = plants.draw(1179, ("peak-memory",), None, 30.0)
     found = gpi.explain(record_of(plant.record(0)))

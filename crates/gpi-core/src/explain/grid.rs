@@ -93,7 +93,7 @@ fn choose_anew(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
     let Ok(chosen) = Error::unless_interrupted(chosen)? else { return Ok(false) };
     let (point, cost) = on_moving_grids(state, chosen, progress)?;
     let is_better = cost < (1.0 - policy.small) * state.cost;
-    // an effect that would become impossible beside them is compensated by them, not explained
+    // an effect that becomes impossible only makes up for errors of these plays
     let is_plausible = state.is_plausible(&point) || !state.is_plausible(&state.point);
     if is_better && is_plausible {
         (state.point, state.cost) = (point, cost);

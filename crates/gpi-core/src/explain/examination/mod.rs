@@ -17,7 +17,8 @@
 //!    states, while the model is far from the noise: what they do is no small change of the rest.
 //! 4. *Slow*: a slow function of time is slower than the lags of G that carry a part of the movement, predicts gaps between its
 //!    knots as well as it fits ([`gaps`]), and does not follow how the input moves ([`follows_input`]). Where one does, the input changes
-//!    the gain, and neither another one nor a shape of loops is named that leaves a larger error.
+//!    the gain, and neither another one nor a shape of loops is named that leaves a larger error. Nor is a shape of loops that
+//!    leaves a larger error than a slow function of time that failed to predict gaps.
 //! 5. *Small, or at the noise*: an effect that is a large part of the output, acts a few times only, or acts like a misfit
 //!    of the hysteresis has brought the model near the noise ([`far_from_noise`]). Where it leaves much unexplained, it
 //!    follows another structure.
@@ -142,7 +143,7 @@ pub(super) fn doubt(
         _ if is_slow => state.follows_input,
         _ => f64::INFINITY,
     };
-    if state.rms(point)?[1] >= least {
+    if least.is_finite() && state.rms(point)?[1] >= least {
         return Ok(Some(Refusal::Surpassed));
     }
     far_from_noise::doubt(state, point, place, progress)
