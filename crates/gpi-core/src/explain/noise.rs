@@ -14,6 +14,8 @@
 //! model that lacks hysteresis or friction leaves an autocorrelated residual as well. It is called noise only if
 //!
 //! - no test of structure fails;
+//! - no effect that the input drives explained more and was refused because no machine can have it: whatever the cause is, what such
+//!   an effect explains depends on the input;
 //! - the output does not integrate the input: the error of a simulation is there the sum of all small forces that no model
 //!   knows, which is predicted by its past as noise with a long memory is;
 //! - s_w < (1 - p) s_e on the training data and, with the same a_i, on the held-out blocks;
@@ -106,10 +108,13 @@ pub(super) fn memory(
     output: usize,
     floor: &NoiseFloor,
 ) -> Option<ColouredNoise> {
-    if matches!(state.integrates(), Ok(true)) {
+    let policy = &state.setup.policy.noise;
+    let falls = |before: f64, after: f64| after < (1.0 - policy.predicted) * before;
+    let follows_input =
+        state.rms(&state.point).is_ok_and(|[_, held_out]| falls(held_out, state.impossible));
+    if follows_input || matches!(state.integrates(), Ok(true)) {
         return None;
     }
-    let policy = &state.setup.policy.noise;
     let colour = NoiseModel::of(residuals, &state.prepared.record);
     let filter = &colour.coefficients[output];
     if filter.is_empty() {
@@ -125,7 +130,6 @@ pub(super) fn memory(
     };
     // what is predictable from its past alone leaves innovations that are as fast as the noise
     let is_fast = innovation > policy.innovation * floor.rms[output];
-    let falls = |before: f64, after: f64| after < (1.0 - policy.predicted) * before;
     let is_noise = !is_fast && own <= loudest;
     let is_predicted = falls(own, innovation) && falls(held_out, predicted);
     let noise = ColouredNoise { output, coefficients: filter.clone(), innovation, deviation: own };

@@ -350,7 +350,8 @@ settings! {
         /// Innovations of coloured noise over the noise floor, which sees its fast part. On records of known truth
         /// coloured noise has about 1, relays and friction more than 4.
         innovation: f64 = 2.0, FROM_ONE;
-        /// Part by which a prediction from the residual's past must lower its standard deviation. By hand.
+        /// Part by which a prediction from the residual's past must lower its standard deviation, and by which an impossible effect
+        /// of the input must not. By hand.
         predicted: f64 = 0.1, PART;
         /// Fourth moment over the square of the second. Stationary Gaussian noise has 3 whatever its
         /// autocorrelation, and what comes in bursts while the stage moves has more. By hand.
@@ -396,6 +397,9 @@ settings! {
         parts: usize = 10, FROM_ONE;
         /// Part of the samples that stand at a limit. By hand: on records of known truth a clipping sensor has 1.5 %.
         clipped: f64 = 0.005, PART;
+        /// Part of the samples between the ends of the range that may repeat the one before them where a few samples are
+        /// to show a limit. By hand: noise in double precision never repeats, and quantized signals do at every turning point.
+        repeated: f64 = 0.001, PART;
         /// Samples of a run at a limit, the part of the input's span that it moves meanwhile, and how many times more
         /// samples stand there than at the next value. By hand.
         run: usize = 3, FROM_ONE;

@@ -146,6 +146,10 @@ fn examined(
             return Ok(if is_finer { Found::FinerGrids } else { Found::Effect { place } });
         }
         evidences[place].doubt = examined.refusal;
+        let trial = &trials[place];
+        if trial.entry.driven && examined.refusal == Some(Refusal::Impossible) {
+            state.impossible = state.impossible.min(trial.rms[1]);
+        }
         let is_better = |one: &Fitted| {
             better.as_ref().is_none_or(|known| one.linearization.cost < known.linearization.cost)
         };

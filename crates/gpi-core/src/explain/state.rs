@@ -125,6 +125,8 @@ pub(super) struct SearchState<'a> {
     pub follows_input: f64,
     /// The same with one that does not predict gaps between its knots.
     pub misses_gaps: f64,
+    /// The same with an effect that the input drives and that no machine can have.
+    pub impossible: f64,
     /// Names of the effects beside which the balance of forces was asked last.
     pub balanced_beside: Option<Vec<&'static str>>,
     /// Effects whose fits from the balance of forces ended far above the model.
@@ -150,6 +152,7 @@ impl<'a> SearchState<'a> {
             refused: Vec::new(),
             follows_input: f64::INFINITY,
             misses_gaps: f64::INFINITY,
+            impossible: f64::INFINITY,
             balanced_beside: None,
             out_of_reach: BTreeSet::new(),
             integrates: OnceLock::new(),
@@ -173,6 +176,7 @@ impl<'a> SearchState<'a> {
             // errors under another loss are not comparable
             follows_input: f64::INFINITY,
             misses_gaps: f64::INFINITY,
+            impossible: f64::INFINITY,
             balanced_beside: None,
             out_of_reach: self.out_of_reach.clone(),
             integrates: self.integrates.clone(),

@@ -4,6 +4,9 @@
 //! the output's largest or smallest value, in a run of equal samples during which an input moves. A quantized signal also has
 //! runs at its turning points. It stands as often at the next level, and a limit does not. Where one end of the range is reached often,
 //! fewer samples show the other.
+//!
+//! Where hardly any other sample repeats the one before it, noise is far above the resolution of the sensor. There a few runs at an end
+//! of the range show a limit, also while the input rests and the output rings.
 
 use crate::explain::policy::OutsidePolicy;
 use crate::{Experiment, Matrix, Record};
@@ -33,6 +36,7 @@ impl Clipped {
 pub(super) fn clipped(record: &Record, output: usize, policy: &OutsidePolicy) -> Clipped {
     let samples = record.samples();
     let none = || vec![Vec::new(); record.experiments().len()];
+    let is_fine = !repeats(record, output, policy);
     let ends = [1.0, -1.0].map(|sign| {
         let values = || {
             record
@@ -48,12 +52,18 @@ pub(super) fn clipped(record: &Record, output: usize, policy: &OutsidePolicy) ->
         for (experiment, runs) in record.experiments().iter().zip(&mut own.runs) {
             let stands = |k: usize| sign * experiment.output[(k, output)] == extreme;
             *runs = runs_of(experiment.input.nrows(), stands);
-            runs.retain(|run| run.len() >= policy.run && moves(experiment, run) > policy.moved);
+            // a stage without noise may rest exactly before it is first moved
+            let is_within = |run: &Range<usize>| is_fine && run.start > 0;
+            runs.retain(|run| {
+                let shows_limit = is_within(run) || moves(experiment, run) > policy.moved;
+                run.len() >= policy.run && shows_limit
+            });
         }
-        (own.count() as f64 > policy.crowded * at_next as f64).then_some(own)
+        let is_crowded = own.count() as f64 > policy.crowded * at_next as f64;
+        (own.count() > 0 && (is_fine || is_crowded)).then_some(own)
     });
     let mut found = Clipped { runs: none(), samples, at: [false; 2] };
-    if !ends.iter().flatten().any(|own| own.share() > policy.clipped) {
+    if !ends.iter().flatten().any(|own| is_fine || own.share() > policy.clipped) {
         return found;
     }
     for own in ends.into_iter().flatten() {
@@ -61,6 +71,20 @@ pub(super) fn clipped(record: &Record, output: usize, policy: &OutsidePolicy) ->
         found.runs.iter_mut().zip(own.runs).for_each(|(all, own)| all.extend(own));
     }
     found
+}
+
+/// Whether more than a part of the samples between the ends of the range repeat the sample before them.
+fn repeats(record: &Record, output: usize, policy: &OutsidePolicy) -> bool {
+    let columns = || record.experiments().iter().map(|run| run.output.column(output));
+    let highest = columns().map(|column| column.max()).fold(f64::NEG_INFINITY, f64::max);
+    let lowest = columns().map(|column| column.min()).fold(f64::INFINITY, f64::min);
+    let is_repeated =
+        |(before, own): (&f64, &f64)| before == own && *own != highest && *own != lowest;
+    let of = |column: nalgebra::DVectorView<f64>| {
+        column.iter().zip(column.iter().skip(1)).filter(|&pair| is_repeated(pair)).count()
+    };
+    let repeated: usize = columns().map(of).sum();
+    repeated as f64 > policy.repeated * record.samples() as f64
 }
 
 /// Whether there are clipped samples at which a model errs more than elsewhere.
@@ -119,10 +143,11 @@ mod tests {
         let found = share(&u, &limited);
         assert!(found > 0.01 && found <= expected / 6000.0, "{found}");
         // few samples at one end, where the other one is a limit
-        let mut sorted = smooth.clone();
+        let coarse: Vec<f64> = smooth.iter().map(|y| (1e3 * y).round() / 1e3).collect();
+        let mut sorted = coarse.clone();
         sorted.sort_by(f64::total_cmp);
         let low = sorted[20];
-        let few: Vec<f64> = smooth.iter().map(|y| y.max(low)).collect();
+        let few: Vec<f64> = coarse.iter().map(|y| y.max(low)).collect();
         assert_eq!(share(&u, &few), 0.0);
         let both: Vec<f64> = few.iter().map(|y| y.min(0.7)).collect();
         let found = clipped(&stage(&u, &both), 0, &OutsidePolicy::default());
@@ -135,6 +160,32 @@ mod tests {
         let resting: Vec<f64> = (0..6000).map(|k| if k < 500 { -1.0 } else { u[k] }).collect();
         let output: Vec<f64> = resting.iter().map(|u| 2.0 * u).collect();
         assert_eq!(share(&resting, &output), 0.0);
+    }
+
+    #[test]
+    fn few_samples_show_a_limit_where_no_others_repeat() {
+        // the input rests after each step, and the output rings beyond the limit once
+        let steps: Vec<f64> = (0..6000).map(|k| if k / 1000 == 3 { 1.0 } else { 0.5 }).collect();
+        let mut e = noise(3);
+        let ringing = |k: usize| {
+            let after = (k % 1000) as f64;
+            steps[k] * (1.0 - (-after / 100.0).exp() * (0.3 * after).cos())
+        };
+        let output: Vec<f64> = (0..6000).map(|k| ringing(k) + 1e-3 * e()).collect();
+        let highest = 1.7;
+        let limited: Vec<f64> = output.iter().map(|y| y.min(highest)).collect();
+        let is_over = |y: &&f64| **y > highest;
+        let over = output.iter().filter(is_over).count();
+        assert!(over > 3 && over < 30, "{over}");
+        let found = clipped(&stage(&steps, &limited), 0, &OutsidePolicy::default());
+        assert_eq!(found.at, [true, false]);
+        assert!(found.runs[0].iter().all(|run| (3000..4000).contains(&run.start)));
+        // the same where the sensor is coarser than its noise
+        let coarse: Vec<f64> = limited.iter().map(|y| (50.0 * y).round() / 50.0).collect();
+        assert_eq!(share(&steps, &coarse), 0.0);
+        // a stage that rests at the start of a record without noise
+        let still: Vec<f64> = (0..6000).map(|k| if k < 1000 { 0.0 } else { 1.0 + e() }).collect();
+        assert_eq!(share(&steps, &still), 0.0);
     }
 
     #[test]
