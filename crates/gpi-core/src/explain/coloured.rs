@@ -14,7 +14,8 @@
 //! 1999, sections 3.2 and 7.4.
 //!
 //! Any smooth error is predicted by its past, the error of a wrong model too, which would pass for noise here. What the rounds
-//! find is therefore kept only if the following holds; otherwise the model before the rounds stands.
+//! find is therefore kept only if the following holds. Otherwise the model before the rounds stands, unless e itself is considerably smaller
+//! after them, on the training data and on what is held out: the search then goes on from there with e, as it does without such noise.
 //!
 //! - They leave autocorrelated noise and nothing else, by all tests of structure.
 //! - e is hardly larger than before. Noise moves the estimates of both fits by little, but where e is an error of the model,
@@ -53,12 +54,24 @@ pub(super) fn search_weighed<'a>(
         let Ok(next) = next else { break };
         latest = Some(next);
     }
-    if let Some(latest) = latest
-        && is_better(&latest, state)?
-    {
+    let Some(latest) = latest else { return Ok(()) };
+    if is_better(&latest, state)? {
         *state = latest;
+    } else if errs_less(&latest, state)? {
+        let mut next = latest.under(state.setup)?;
+        run(&mut next, progress)?;
+        if next.cost < state.cost {
+            *state = next;
+        }
     }
     Ok(())
+}
+
+/// Whether the latest state's errors are considerably smaller than before, on the training data and on what is held out.
+fn errs_less(latest: &SearchState, before: &SearchState) -> Result<bool, Error> {
+    let most = 1.0 - before.setup.policy.noise.grown;
+    let pairs = latest.rms(&latest.point)?.into_iter().zip(before.rms(&before.point)?);
+    Ok(pairs.into_iter().all(|(latest, before)| latest < most * before))
 }
 
 /// Whether autocorrelated noise is all that the latest state leaves, its residual is not much larger than before, and the noise is also

@@ -15,7 +15,8 @@
 //!    the training data, or by most of the squares of what the effect changes there, see [`is_seen`]. A model with fewer unknowns than the present one adds nothing that chance could use: of it, the fall of
 //!    the sum is enough, if it is substantial.
 //! 4. *Substantial*: far from the noise a bad fit resembles many effects a little, so a large part of the training
-//!    and of the held-out squares must go. This is not asked near the noise, of an effect whose signature no bad fit
+//!    and of the held-out squares must go. Near the noise, a considerable part of those above the noise is enough, of the training data or
+//!    of what is held out. This is not asked of an effect whose signature no bad fit
 //!    has, or of more of a driven effect that the model has already.
 //!
 //! Of the accepted trials the one with the largest deviance beyond its threshold is taken. Trials whose deviance lies
@@ -82,6 +83,8 @@ pub(super) struct Evidence<'a> {
     pub squares: [f64; 2],
     /// The squares that noise alone would leave.
     pub noise: f64,
+    /// The same of the held-out blocks.
+    pub held_out_noise: f64,
     /// Squares of each held-out block without and with the effect.
     pub held_out: [&'a [f64]; 2],
     /// M, the number of their values.
@@ -231,12 +234,20 @@ fn is_substantial(trial: &Evidence, policy: &JudgementPolicy) -> bool {
 /// Whether a trial is substantial, or need not be. Where the output integrates the input, small errors of v add up to a residual
 /// that follows the output, the input or time, so that only what is added to the output may take a small part of it.
 fn is_weighty(trial: &Evidence, policy: &JudgementPolicy) -> bool {
-    let [before, after] = trial.squares;
     let adds_up = trial.is_integrated && !trial.is_added;
     let is_near_noise = !adds_up
-        && after < policy.near_noise * trial.noise
-        && before - after > policy.beyond_rest * (after - trial.noise);
+        && trial.squares[1] < policy.near_noise * trial.noise
+        && takes_much_of_the_rest(trial, policy);
     is_substantial(trial, policy) || is_near_noise || trial.is_unique || trial.is_more
+}
+
+/// Whether a trial takes a considerable part of the squares above the noise, of the training data or of what is held out.
+fn takes_much_of_the_rest(trial: &Evidence, policy: &JudgementPolicy) -> bool {
+    let takes = |[before, after]: [f64; 2], noise: f64| {
+        before - after > policy.beyond_rest * (after - noise)
+    };
+    let held_out = trial.held_out.map(|blocks| blocks.iter().sum());
+    takes(trial.squares, trial.noise) || takes(held_out, trial.held_out_noise)
 }
 
 /// Whether the held-out squares, block by block without and with an effect, have fallen significantly.
@@ -290,6 +301,7 @@ mod tests {
             threshold: 40.0,
             squares: [100.0, 60.0],
             noise: 1.0,
+            held_out_noise: 1.0,
             held_out: [&BEFORE, &AFTER],
             held_out_values: 400.0,
             change: None,
@@ -372,6 +384,7 @@ mod tests {
         let small = |change: fn(&mut Evidence)| {
             judged(|trial| {
                 trial.squares[1] = 90.0;
+                trial.held_out = [&BEFORE, &[8.0, 8.8, 7.2, 8.0]];
                 change(trial);
             })
         };
@@ -379,6 +392,16 @@ mod tests {
         // it takes 10, and leaves 19 or 21 above the noise
         assert_eq!(small(|trial| trial.noise = 71.0), Ok(()));
         assert_eq!(small(|trial| trial.noise = 69.0), Err(Refusal::Insubstantial));
+        // it takes 8, and leaves 15 or 17 above the noise of what is held out
+        let held_out = |noise| {
+            judged(|trial| {
+                (trial.squares, trial.noise) = ([100.0, 90.0], 69.0);
+                trial.held_out = [&BEFORE, &[8.0, 8.8, 7.2, 8.0]];
+                trial.held_out_noise = noise;
+            })
+        };
+        assert_eq!(held_out(17.0), Ok(()));
+        assert_eq!(held_out(15.0), Err(Refusal::Insubstantial));
         let near = |noise| judged(|trial| (trial.squares, trial.noise) = ([300.0, 226.0], noise));
         assert_eq!(near(101.0), Ok(()));
         assert_eq!(near(100.0), Err(Refusal::Insubstantial), "more than 1.5 times its rms");

@@ -246,6 +246,7 @@ fn evidence<'a>(
         threshold: trial.threshold,
         squares,
         noise,
+        held_out_noise: noise * state.setup.held_out_values() / state.prepared.values(),
         held_out,
         held_out_values: state.setup.held_out_values(),
         change,

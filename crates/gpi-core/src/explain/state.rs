@@ -261,8 +261,20 @@ impl<'a> SearchState<'a> {
         if let Some(known) = self.integrates.get() {
             return Ok(*known);
         }
-        let found = integrates(&self.prepared.record, &self.setup.policy.outside)?;
+        let policy = &self.setup.policy.outside;
+        let found = !self.forgets()? && integrates(&self.prepared.record, policy)?;
         Ok(*self.integrates.get_or_init(|| found))
+    }
+
+    /// Whether the model is near the noise, and its dynamics forget within a part of the record: then the output does not integrate,
+    /// even if a hysteresis resembles an integral of the input.
+    fn forgets(&self) -> Result<bool, Error> {
+        let policy = &self.setup.policy.outside;
+        let samples = policy.forgotten * self.prepared.record.longest() as f64;
+        let slowest =
+            self.point.dynamics.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+        let is_near = self.cost <= policy.near_noise.powi(2) * self.noise_squares()?;
+        Ok(is_near && slowest < (-1.0 / samples).exp())
     }
 
     /// The training squares that noise alone would leave.
