@@ -159,40 +159,43 @@ def test_plays_are_chosen_anew_beside_an_effect_that_is_found(seed, effects, mos
 
 
 @pytest.mark.slow
-def test_what_made_up_for_a_drift_is_dropped_with_it():
-    # creep takes the place of a drift, and then also explains what speed-dependent plays did beside it
-    plant = plants.draw(1116, ("creep",), None, 30.0)
+@pytest.mark.parametrize(
+    ("seed", "lacking", "most"),
+    [
+        # a drift and two lags of G follow the creep at first
+        (1098, {"covariate", "stiffness", "creep"}, 1.02),
+        # creep takes the place of a drift, and then also explains what speed-dependent plays did beside it
+        (1116, {"creep"}, 1.02),
+        # a wide hysteresis resembles an integral of the input, which a force in the mechanics would follow
+        (1182, {"output-nonlinearity"}, 1.02),
+        # smooth errors of the model pass for coloured noise, whose search finds the way to a better one
+        (1197, {"stiffness", "rate-dependence"}, 1.9),
+        # the drift is a small part of the training squares, and a large one of the held-out squares
+        (1198, {"gain-drift", "stiffness", "drift"}, 1.02),
+    ],
+)
+def test_small_effects_beside_others_are_named(seed, lacking, most):
+    plant = plants.draw(seed, tuple(sorted(lacking)), None, 30.0)
     found = gpi.explain(record_of(plant.record(0)))
-    assert found.effects == ["creep"]
-    assert found.after["holdout"]["rms"] < 1.02 * plant.noise_std
+    assert set(found.effects) == lacking
+    assert found.after["holdout"]["rms"] < most * plant.noise_std
 
 
 @pytest.mark.slow
-def test_creep_is_named_where_it_hides_in_slow_poles_beside_a_force():
-    # a drift and two lags of G follow the creep at first
-    plant = plants.draw(1098, ("covariate", "stiffness", "creep"), None, 30.0)
-    found = gpi.explain(record_of(plant.record(0)))
-    assert set(found.effects) == {"covariate", "stiffness", "creep"}
-    assert found.after["holdout"]["rms"] < 1.02 * plant.noise_std
-
-
-@pytest.mark.slow
-def test_a_gain_that_past_peaks_change_does_not_drift():
-    plant = plants.draw(1109, ("peak-memory",), None, 30.0)
+@pytest.mark.parametrize(
+    ("seed", "effect", "why"),
+    [
+        (1109, "gain-drift", "follows how the input moves"),
+        # knots follow the gain better than any shape of loops, but do not predict gaps
+        (1179, "hysteresis-shape", "function of time that was refused"),
+    ],
+)
+def test_a_gain_that_past_peaks_change_has_no_name(seed, effect, why):
+    plant = plants.draw(seed, ("peak-memory",), None, 30.0)
     found = gpi.explain(record_of(plant.record(0)))
     assert not found.effects
     reasons = {one["effect"]: one["why"] for one in found.to_dict()["rejected"]}
-    assert "follows how the input moves" in reasons["gain-drift"]
-
-
-@pytest.mark.slow
-def test_no_shape_of_loops_that_explains_less_than_a_refused_function_of_time():
-    # the gain depends on past peaks; knots follow that better than any shape, but do not predict gaps
-    plant = plants.draw(1179, ("peak-memory",), None, 30.0)
-    found = gpi.explain(record_of(plant.record(0)))
-    assert not found.effects
-    reasons = {one["effect"]: one["why"] for one in found.to_dict()["rejected"]}
-    assert "function of time that was refused" in reasons["hysteresis-shape"]
+    assert why in reasons[effect]
 
 
 @pytest.mark.slow

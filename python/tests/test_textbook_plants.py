@@ -23,7 +23,7 @@ MORE = [
     *(("clipped", 2000), ("tanks", 2002), ("tanks", 2004)),
     *(("hydraulic", 1001), ("hydraulic", 2004), ("hydraulic", 2005)),
     *(("maxwell-slip", 1002), ("self-heating", 1002), ("self-heating", 1003)),
-    *(("self-heating", 5002), ("gain", 1003)),
+    *(("self-heating", 5002), ("gain", 1003), ("clipped", 5001), ("tanks", 5003)),
 ]
 INTEGRATING = ("motor", "hydraulic")
 # Their lags outlast the impulse response that the record affords.
