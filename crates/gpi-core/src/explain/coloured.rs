@@ -15,7 +15,8 @@
 //!
 //! Any smooth error is predicted by its past, the error of a wrong model too, which would pass for noise here. What the rounds
 //! find is therefore kept only if the following holds. Otherwise the model before the rounds stands, unless e itself is considerably smaller
-//! after them, on the training data and on what is held out: the search then goes on from there with e, as it does without such noise.
+//! after them, on the training data and on what is held out: the search then goes on from there with e, as it does without such noise, and
+//! its model is kept if it is near the noise.
 //!
 //! - They leave autocorrelated noise and nothing else, by all tests of structure.
 //! - e is hardly larger than before. Noise moves the estimates of both fits by little, but where e is an error of the model,
@@ -23,6 +24,7 @@
 //! - The a_i also predict the noise at rest or between repeated periods, where the record has them: the error of a model is
 //!   not there when nothing moves.
 
+use super::examination::is_near;
 use super::finish::refined;
 use super::noise::{is_alone, memory};
 use super::residual::{PREDICTION, STRUCTURE, WHITENESS, tests_of};
@@ -60,7 +62,7 @@ pub(super) fn search_weighed<'a>(
     } else if errs_less(&latest, state)? {
         let mut next = latest.under(state.setup)?;
         run(&mut next, progress)?;
-        if next.cost < state.cost {
+        if next.cost < state.cost && is_near(&next, &next.point)? {
             *state = next;
         }
     }

@@ -23,10 +23,11 @@
 //! The number of knots was chosen beside a model that did not fit yet. In both rivals, every second knot is therefore removed
 //! as long as that lowers the BIC. Superfluous knots would count as unknowns.
 
-use super::judgement::{Significance, is_superfluous};
+use super::judgement::is_superfluous;
 use super::ranking::{Ranked, scored_beside};
 use super::revision::drop_superfluous;
 use super::state::{Addition, SearchState, Trial};
+use super::threshold::Significance;
 use super::trial::{ANY, measured, plausible_part, start, threshold};
 use crate::Error;
 use crate::Progress;

@@ -6,12 +6,12 @@
 //! begins there, without plays and deadzones.
 
 use super::force_balance::{Balance, balance, squares};
-use super::judgement::Significance;
 use super::limits::limited;
 use super::outside::limits;
 use super::ranking::Ranked;
 use super::score::Score;
 use super::state::{SearchState, Trial};
+use super::threshold::Significance;
 use crate::chain::point::Point;
 use crate::effects::{
     Drives, Effect, Entry, InnerLoop, OutputKind, PlaceMut, Proposal, Situation, Stage,

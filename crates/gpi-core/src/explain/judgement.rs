@@ -1,4 +1,4 @@
-//! Which trial is accepted, and why another one is not: functions of numbers alone.
+//! Which trial is accepted by itself, and why another one is not: functions of numbers alone.
 //!
 //! A trial is the whole model with one more effect, fitted jointly. With J the weighted sum of squared residuals
 //! over the N training values, its *deviance* `N ln(J_before / J_after)` is twice the rise of the log-likelihood of
@@ -18,59 +18,9 @@
 //!    and of the held-out squares must go. Near the noise, a considerable part of those above the noise is enough, of the training data or
 //!    of what is held out. This is not asked of an effect whose signature no bad fit
 //!    has, or of more of a driven effect that the model has already.
-//!
-//! Of the accepted trials the one with the largest deviance beyond its threshold is taken. Trials whose deviance lies
-//! within that threshold of its own explain the same: of these, one with plausible parameters is preferred, more of a driven
-//! effect that the model has already to a new name, of functions of time one that is added to the output and gains nearly the same,
-//! and the others are reported as confounded.
 
 use super::policy::JudgementPolicy;
 use super::refusal::Refusal;
-
-/// What a trial's deviance must exceed, before the residual's autocorrelation is known.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Significance {
-    /// N, the number of training values.
-    pub values: f64,
-    /// q, the number of parameters that were added.
-    pub added: usize,
-    /// Whether derivatives of the whole record would take long, and parts of it stand for the rest.
-    pub is_long: bool,
-    /// Whether the model has this driven effect already.
-    pub is_more: bool,
-}
-
-impl Significance {
-    fn white(&self, policy: &JudgementPolicy) -> f64 {
-        self.added.max(1) as f64 * self.values.ln() + 2.0 * policy.looks.ln()
-    }
-
-    /// More of what a long record shows already need not be much: its held-out blocks are many samples.
-    fn is_certain_to_be_real(&self) -> bool {
-        self.is_long && self.is_more
-    }
-
-    /// The threshold for white noise.
-    pub(super) fn threshold(&self, policy: &JudgementPolicy) -> f64 {
-        let white = self.white(policy);
-        if self.is_certain_to_be_real() { white } else { white.max(policy.least * self.values) }
-    }
-
-    /// Whether the residual's autocorrelation could change the answer.
-    pub(super) fn depends_on_autocorrelation(
-        &self,
-        deviance: f64,
-        policy: &JudgementPolicy,
-    ) -> bool {
-        let is_beyond = self.is_long && deviance > policy.certain * self.white(policy);
-        deviance > self.threshold(policy) && !self.is_certain_to_be_real() && !is_beyond
-    }
-
-    /// The threshold for noise whose autocorrelation raises the covariance by a factor.
-    pub(super) fn threshold_of_autocorrelated(&self, factor: f64, policy: &JudgementPolicy) -> f64 {
-        self.threshold(policy).max(factor * self.white(policy))
-    }
-}
 
 /// What is known of a trial.
 #[derive(Clone, Copy, Debug)]
@@ -132,56 +82,6 @@ pub(super) fn judge(trial: &Evidence, policy: &JudgementPolicy) -> Result<(), Re
     } else {
         Ok(())
     }
-}
-
-/// The place of the trial to take, of those that are sorted by their deviance beyond the threshold. Another measured
-/// column is taken instead of a slow function of time where its held-out error is no larger than `measured` times.
-pub(super) fn choose(
-    trials: &[Evidence],
-    measured: f64,
-    policy: &JudgementPolicy,
-) -> Option<usize> {
-    let is_accepted = |trial: &Evidence| judge(trial, policy).is_ok();
-    let best = trials.iter().position(is_accepted)?;
-    let is_as_good = |trial: &Evidence| {
-        explains_as_much(trial, &trials[best]) && is_accepted(trial) && trial.is_plausible
-    };
-    let measured_instead = |trial: &Evidence| {
-        let rms = |trial: &Evidence| trial.held_out[1].iter().sum::<f64>().sqrt();
-        let is_near = rms(trial) < measured * rms(&trials[best]);
-        trials[best].is_slow && trial.is_measured && is_near && is_accepted(trial)
-    };
-    // of functions of time, one that is added assumes least
-    let is_simpler = |trial: &Evidence| {
-        let is_tied = trial.deviance > policy.tied * trials[best].deviance;
-        trials[best].is_slow && trial.is_slow && trial.is_added && is_tied && is_accepted(trial)
-    };
-    let instead = trials.iter().position(measured_instead);
-    let instead = instead.or_else(|| trials.iter().position(is_simpler));
-    // no new name where more of what is there explains the same
-    let is_no_new_name = |trial: &Evidence| trial.is_more && is_as_good(trial);
-    let instead = instead.or_else(|| trials.iter().position(is_no_new_name));
-    Some(instead.or_else(|| trials.iter().position(is_as_good)).unwrap_or(best))
-}
-
-/// Why a trial was not taken, with the one that was taken if any.
-pub(super) fn refusal(
-    trial: &Evidence,
-    taken: Option<&Evidence>,
-    policy: &JudgementPolicy,
-) -> Refusal {
-    match taken {
-        _ if !trial.is_driven => Refusal::Undriven,
-        Some(_) if trial.doubt.is_some() => trial.doubt.unwrap_or(Refusal::Inferior),
-        Some(taken) if explains_as_much(trial, taken) => Refusal::Confounded,
-        Some(_) => Refusal::Inferior,
-        None => judge(trial, policy).err().unwrap_or(Refusal::Inferior),
-    }
-}
-
-/// Whether the deviance reaches that of another one up to the other's threshold.
-fn explains_as_much(trial: &Evidence, other: &Evidence) -> bool {
-    trial.deviance > other.deviance - other.threshold
 }
 
 /// Whether the held-out squares fall by nearly as large a part as the training squares, or as they must where the held-out
@@ -288,14 +188,14 @@ pub(super) fn is_superfluous(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    const BEFORE: [f64; 4] = [10.0, 11.0, 9.0, 10.0];
+    pub(in crate::explain) const BEFORE: [f64; 4] = [10.0, 11.0, 9.0, 10.0];
     const AFTER: [f64; 4] = [5.0, 5.5, 4.5, 5.0];
 
     /// A trial that meets every condition, far from the noise.
-    fn sound() -> Evidence<'static> {
+    pub(in crate::explain) fn sound() -> Evidence<'static> {
         Evidence {
             deviance: 500.0,
             threshold: 40.0,
@@ -410,40 +310,6 @@ mod tests {
     }
 
     #[test]
-    fn of_equals_a_plausible_one_is_taken_and_the_others_are_confounded() {
-        let policy = JudgementPolicy::default();
-        let best = Evidence { is_plausible: false, ..sound() };
-        let equal = Evidence { deviance: 470.0, ..sound() };
-        let weaker = Evidence { deviance: 450.0, ..sound() };
-        assert_eq!(choose(&[best, equal, weaker], 1.05, &policy), Some(1));
-        assert_eq!(choose(&[best, weaker], 1.05, &policy), Some(0));
-        let unconfirmed = Evidence { held_out: [&BEFORE, &BEFORE], ..best };
-        assert_eq!(choose(&[unconfirmed, weaker], 1.05, &policy), Some(1));
-        assert_eq!(choose(&[unconfirmed], 1.05, &policy), None);
-        assert_eq!(refusal(&equal, Some(&best), &policy), Refusal::Confounded);
-        assert_eq!(refusal(&weaker, Some(&best), &policy), Refusal::Inferior);
-        assert_eq!(refusal(&unconfirmed, None, &policy), Refusal::Unconfirmed);
-        let drift = Evidence { is_slow: true, ..sound() };
-        let measured = Evidence { is_measured: true, ..weaker };
-        assert_eq!(choose(&[drift, weaker, measured], 1.05, &policy), Some(2));
-        assert_eq!(choose(&[sound(), measured], 1.05, &policy), Some(0));
-        let gain_drift = Evidence { is_slow: true, ..sound() };
-        let added = Evidence { deviance: 499.0, is_slow: true, is_added: true, ..equal };
-        assert_eq!(choose(&[gain_drift, added], 1.05, &policy), Some(1));
-        let doubted = Evidence { doubt: Some(Refusal::NotItsOwn), ..sound() };
-        assert_eq!(choose(&[doubted, weaker], 1.05, &policy), Some(1));
-        assert_eq!(refusal(&doubted, None, &policy), Refusal::NotItsOwn);
-        let decay = Evidence { is_driven: false, ..equal };
-        assert_eq!(refusal(&decay, Some(&best), &policy), Refusal::Undriven);
-        let more = Evidence { is_more: true, ..equal };
-        assert_eq!(choose(&[sound(), equal, more], 1.05, &policy), Some(2));
-        assert_eq!(
-            choose(&[sound(), Evidence { is_more: true, ..weaker }], 1.05, &policy),
-            Some(0)
-        );
-    }
-
-    #[test]
     fn blocks_confirm_by_their_mean_or_by_being_one_sided() {
         let policy = JudgementPolicy::default();
         let confirmed = |after: [f64; 4]| is_confirmed([&[10.0; 4], &after], &policy);
@@ -455,28 +321,6 @@ mod tests {
         assert!(!confirmed([9.96; 4]));
         assert!(!confirmed([10.5; 4]));
         assert!(!is_confirmed([&[], &[]], &policy));
-    }
-
-    #[test]
-    fn the_threshold_counts_parameters_looks_and_autocorrelation() {
-        let policy = JudgementPolicy::default();
-        let of = |values, is_long, is_more| Significance { values, added: 2, is_long, is_more };
-        let white = |values: f64| 2.0 * values.ln() + 2.0 * 150_f64.ln();
-        assert!((of(500.0, false, false).threshold(&policy) - white(500.0)).abs() < 1e-12);
-        // of many values a part of the squares is asked for
-        let usual = of(1e5, false, false);
-        assert!((usual.threshold(&policy) - 2000.0).abs() < 1e-9);
-        assert!(usual.depends_on_autocorrelation(2001.0, &policy));
-        assert!(!usual.depends_on_autocorrelation(1999.0, &policy));
-        let raised = usual.threshold_of_autocorrelated(200.0, &policy);
-        assert!((raised - 200.0 * white(1e5)).abs() < 1e-9);
-        assert_eq!(usual.threshold_of_autocorrelated(1.0, &policy), usual.threshold(&policy));
-        // more of what a long record shows need not be much, and no autocorrelation explains very much
-        let more = of(1e5, true, true);
-        assert!((more.threshold(&policy) - white(1e5)).abs() < 1e-12);
-        assert!(!more.depends_on_autocorrelation(1e9, &policy));
-        assert!(!of(1e5, true, false).depends_on_autocorrelation(1e9, &policy));
-        assert!(usual.depends_on_autocorrelation(1e9, &policy));
     }
 
     #[test]

@@ -15,12 +15,13 @@
 //!    function of time that it explains as well, forces inside the mechanics enter where the input does if that explains nearly as
 //!    much (`force_at_input`), and the residual is tested for remaining structure (`residual`).
 //!
-//! The files import in one direction only: `policy` (every tolerance), `judgement`, `base`, `projection`,
+//! The files import in one direction only: `policy` (every tolerance), `threshold`, `judgement`, `choice`, `base`, `projection`,
 //! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `sensor_range`, `trial`,
-//! `restart`, `examination`, `grid`, `revision`, `round`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
+//! `restart`, `examination`, `grid`, `revision`, `round`, `pairs`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
 
 pub(crate) mod base;
 mod blocks;
+mod choice;
 mod coloured;
 mod concurrently;
 mod examination;
@@ -36,6 +37,7 @@ mod limits;
 mod moved_resonance;
 mod noise;
 mod outside;
+mod pairs;
 mod policy;
 mod probability;
 mod projection;
@@ -53,6 +55,7 @@ mod setup;
 mod slip;
 mod state;
 mod steps;
+mod threshold;
 mod trial;
 mod verdict;
 

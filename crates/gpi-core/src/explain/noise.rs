@@ -150,14 +150,14 @@ pub(super) fn is_alone(
     let record = &state.prepared.record;
     let is_steady =
         |residuals: &[Matrix]| kurtosis(residuals, record, noise.output) <= policy.kurtosis;
-    !is_remainder && is_steady(residuals) && is_steady(&predictable(residuals, noise))
+    !is_remainder && is_steady(residuals) && is_steady(&predictable(residuals, &noise.coefficients))
 }
 
 /// The part of each residual that its own past predicts, `sum_i a_i e(k - i)` for all columns.
-fn predictable(residuals: &[Matrix], noise: &ColouredNoise) -> Vec<Matrix> {
+fn predictable(residuals: &[Matrix], coefficients: &[f64]) -> Vec<Matrix> {
     let of = |residual: &Matrix| {
         Matrix::from_fn(residual.nrows(), residual.ncols(), |k, column| {
-            let past = noise.coefficients.iter().zip((0..k).rev());
+            let past = coefficients.iter().zip((0..k).rev());
             past.map(|(a, before)| a * residual[(before, column)]).sum()
         })
     };
@@ -167,12 +167,12 @@ fn predictable(residuals: &[Matrix], noise: &ColouredNoise) -> Vec<Matrix> {
 /// Standard deviations of a residual and of what its past does not predict.
 fn one_step(residuals: &[Matrix], record: &Record, output: usize, filter: &[f64]) -> (f64, f64) {
     let (mut own, mut left, mut count) = (0.0, 0.0, 0.0);
-    for (residual, experiment) in residuals.iter().zip(record.experiments()) {
-        let column = residual.column(output);
+    let pairs = residuals.iter().zip(predictable(residuals, filter));
+    for ((residual, predicted), experiment) in pairs.zip(record.experiments()) {
         for k in experiment.scored_runs().flatten().filter(|&k| k >= filter.len()) {
-            let predicted: f64 = filter.iter().zip(1..).map(|(a, lag)| a * column[k - lag]).sum();
-            own += column[k] * column[k];
-            left += (column[k] - predicted).powi(2);
+            let at = (k, output);
+            own += residual[at] * residual[at];
+            left += (residual[at] - predicted[at]).powi(2);
             count += 1.0;
         }
     }
@@ -220,7 +220,7 @@ mod tests {
         let noise = |k: usize| ((k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64;
         let own = |k: usize| if k % 1000 < 100 { 0.6 * (0.06 * k as f64).sin() } else { 0.0 };
         let residual =
-            Matrix::from_fn(10_000, 1, |k, _| noise(k) / (1 << 24) as f64 - 0.5 + own(k));
+            Matrix::from_fn(10_000, 1, |k, _| noise(k) / f64::from(1 << 24) - 0.5 + own(k));
         let coefficients = vec![0.1; 10];
         let colour = ColouredNoise { output: 0, coefficients, innovation: 1.0, deviation: 1.0 };
         let (input, output, covariates) =
@@ -231,7 +231,7 @@ mod tests {
         let residuals = [residual];
         let most = NoisePolicy::default().kurtosis;
         assert!(kurtosis(&residuals, &record, 0) < most);
-        let bursts = predictable(&residuals, &colour);
+        let bursts = predictable(&residuals, &colour.coefficients);
         assert!(kurtosis(&bursts, &record, 0) > most);
         // the mean of the ten samples before
         let before: f64 = (40..50).map(|k| residuals[0][(k, 0)]).sum();

@@ -1,9 +1,10 @@
 //! One round of the search: candidates, their joint fits, and the one that is taken.
 
+use super::choice::{choose, refusal};
 use super::examination::examine;
 use super::forces::{Balanced, balanced, forces, remember_out_of_reach};
 use super::grid::{finer_grids_instead, refine_grids};
-use super::judgement::{Evidence, choose, judge, refusal};
+use super::judgement::{Evidence, judge};
 use super::probability::probabilities;
 use super::ranking::{Ranked, ranked};
 use super::refusal::Refusal;
@@ -21,6 +22,7 @@ use std::collections::BTreeSet;
 
 /// Takes the best effect, if any is confirmed; says whether the model became another.
 pub(super) fn round(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    state.unconfirmed = None;
     let Some(best) = candidates(state, progress)? else {
         state.last.clear();
         return Ok(false);
@@ -40,9 +42,14 @@ pub(super) fn round(state: &mut SearchState, progress: Progress) -> Result<bool,
         }
         Found::Nothing { better } => {
             (state.last, _) = answers(state, &trials, &evidences, None, failed)?;
+            let unconfirmed = unconfirmed(state, &trials, &evidences);
             let Some(better) = better else {
                 // what a strong candidate promised may be that of a finer grid
-                return Ok(!state.is_rich && refine_grids(state, progress)?);
+                if !state.is_rich && refine_grids(state, progress)? {
+                    return Ok(true);
+                }
+                state.unconfirmed = unconfirmed;
+                return Ok(false);
             };
             (state.point, state.cost) = (better.point, better.linearization.cost);
             Ok(true)
@@ -112,6 +119,17 @@ fn begin_again(
         trials[place] = better;
     }
     Ok(())
+}
+
+/// The trial that takes most of the training squares, where that is a large part and the held-out blocks do not confirm it.
+fn unconfirmed(state: &SearchState, trials: &[Trial], evidences: &[Evidence]) -> Option<Trial> {
+    let policy = &state.setup.policy.judgement;
+    let is_doubtful = |evidence: &Evidence| {
+        let [before, after] = evidence.squares;
+        judge(evidence, policy) == Err(Refusal::Unconfirmed)
+            && after < (1.0 - policy.substantial) * before
+    };
+    evidences.iter().position(is_doubtful).map(|place| trials[place].clone())
 }
 
 /// The place of the trial to take.
@@ -188,7 +206,11 @@ fn answers(
 }
 
 /// Adds an effect, and examines earlier decisions again beside it.
-fn add(state: &mut SearchState, mut addition: Addition, progress: Progress) -> Result<(), Error> {
+pub(super) fn add(
+    state: &mut SearchState,
+    mut addition: Addition,
+    progress: Progress,
+) -> Result<(), Error> {
     let joins = addition.trial.entry.free_order == FreeOrder::JoinsG;
     if joins && !state.setup.order_is_given {
         join_modes(&mut addition.trial.point);

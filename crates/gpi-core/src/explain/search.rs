@@ -4,6 +4,7 @@
 use super::examination::doubt;
 use super::exchange::{exchange_slow, prefer_driven};
 use super::force_at_input::enter_with_input;
+use super::pairs::add_pair;
 use super::ranking::scored_beside;
 use super::refusal::Refusal;
 use super::revision::{keep_plausible, settle_lags, shed_lags, shed_lines, straighten};
@@ -38,8 +39,11 @@ pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Err
 fn add_effects(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
     for _ in 0..state.setup.policy.revision.rounds {
         // a finer grid or a longer fit may have led a mode to a line
-        if !round(state, progress)? && !shed_lines(state, progress)? && !shed_lags(state, progress)?
-        {
+        let is_changed = round(state, progress)?
+            || add_pair(state, progress)?
+            || shed_lines(state, progress)?
+            || shed_lags(state, progress)?;
+        if !is_changed {
             break;
         }
     }

@@ -119,6 +119,9 @@ pub(super) struct SearchState<'a> {
     pub wrong: Vec<Vec<Vec<usize>>>,
     /// What was tried in the last round and not taken.
     pub last: Vec<Rejected>,
+    /// The trial of the last round that takes a large part of the training squares, where nothing was taken and the held-out blocks did
+    /// not confirm it.
+    pub unconfirmed: Option<Trial>,
     /// What was taken and did not pass the last examination.
     pub refused: Vec<Rejected>,
     /// The smallest held-out rms error with a slow function of time that follows the input's motion; infinite without one.
@@ -149,6 +152,7 @@ impl<'a> SearchState<'a> {
             left: Vec::new(),
             wrong: Vec::new(),
             last: Vec::new(),
+            unconfirmed: None,
             refused: Vec::new(),
             follows_input: f64::INFINITY,
             misses_gaps: f64::INFINITY,
@@ -172,6 +176,7 @@ impl<'a> SearchState<'a> {
             left: self.left.clone(),
             wrong: self.wrong.clone(),
             last: self.last.clone(),
+            unconfirmed: None,
             refused: self.refused.clone(),
             // errors under another loss are not comparable
             follows_input: f64::INFINITY,

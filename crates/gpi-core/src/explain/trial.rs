@@ -23,11 +23,11 @@
 
 use super::concurrently::concurrently;
 use super::forces::with_feedthrough;
-use super::judgement::Significance;
 use super::policy::FitPolicy;
 use super::ranking::{Ranked, promised};
 use super::score::Score;
 use super::state::{SearchState, Trial};
+use super::threshold::Significance;
 use crate::Error;
 use crate::Progress;
 use crate::chain::point::Point;

@@ -103,7 +103,7 @@ pub(super) fn doubt(
 }
 
 /// Whether a model is near the noise on what is held out.
-pub(super) fn is_near(state: &SearchState, point: &Point) -> Result<bool, Error> {
+pub(in crate::explain) fn is_near(state: &SearchState, point: &Point) -> Result<bool, Error> {
     let test = state.setup.test.scored().max(1) as f64;
     let trained = state.prepared.record.scored().max(1) as f64;
     let noise = state.noise_squares()? / trained;

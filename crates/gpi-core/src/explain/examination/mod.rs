@@ -35,6 +35,8 @@ mod gaps;
 mod own_part;
 mod within_limits;
 
+pub(super) use far_from_noise::is_near;
+
 use super::judgement::{Evidence, judge};
 use super::outside::saturates;
 use super::refusal::Refusal;
