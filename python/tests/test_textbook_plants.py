@@ -30,9 +30,12 @@ INTEGRATING = ("motor", "hydraulic")
 SLOW = [("tanks", 1003), ("tanks", 1004), ("tanks", 1005), ("heater", 1001)]
 
 
-@pytest.mark.parametrize(("name", "seed"), [*itertools.product(textbook.STAGES, SEEDS), *MORE])
+ORDINARY = textbook.STAGES | textbook.ACQUISITION
+
+
+@pytest.mark.parametrize(("name", "seed"), [*itertools.product(ORDINARY, SEEDS), *MORE])
 def test_nothing_false_is_named(name: str, seed: int) -> None:
-    label, run = textbook.STAGES[name], textbook.draw(name, seed)
+    label, run = ORDINARY[name], textbook.draw(name, seed)
     found = gpi.explain(gpi.Record(run.u, run.y, rate=run.rate, covariates=run.columns))
     assert set(found.effects) <= label.must | label.may
     reason = found.to_dict()["verdict_reason"] or ""

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.random import Generator
 
 from ..excitation import Array, stream
-from . import loops, mechanics, operators, process, sensing, slow
+from . import acquisition, loops, mechanics, operators, process, sensing, slow
 from .combined import BESIDE, FORCES
 from .drives import Drive, drive
 from .run import Run
 
-__all__ = ["MECHANICS", "STAGES", "Record", "Stage", "draw", "is_in_motion"]
+__all__ = ["ACQUISITION", "MECHANICS", "STAGES", "Record", "Stage", "draw", "is_in_motion"]
 
 MEMORY_IN_THE_FORCE = ("stiffness", "hysteretic-stiffness", "friction", "bouc-wen", "hysteresis-shape")
 
@@ -86,6 +86,20 @@ STAGES: dict[str, Stage] = {
     "bent": stage(sensing.bent, must=["output-nonlinearity"]),
 }
 
+#: Ordinary stages whose data acquisition is at fault.
+ACQUISITION: dict[str, Stage] = {
+    "clocks": stage(acquisition.clocks),
+    "jitter": stage(acquisition.jitter),
+    "repeated": stage(acquisition.repeated, may=["outliers"]),
+    "interpolation": stage(acquisition.interpolation),
+    # the error of a converter is noise where the drive passes many steps
+    "converter": stage(acquisition.converter, may=["coloured-noise"]),
+    "coupled": stage(acquisition.coupled),
+    "wandering-hum": stage(acquisition.wandering_hum, may=["periodic-disturbance"]),
+    "slips": stage(acquisition.slips),
+    "squared": stage(acquisition.squared, may=["output-nonlinearity", "hysteresis-shape"]),
+}
+
 #: Forces inside the mechanics, alone and beside another effect.
 MECHANICS: dict[str, Stage] = {
     f"{name}+{other}": Stage(
@@ -116,7 +130,7 @@ def is_in_motion(seed: int) -> bool:
 
 def draw(name: str, seed: int, number: int = 0) -> Record:
     """Experiment `number` on the stage `name` of a seed."""
-    kind = (STAGES | MECHANICS)[name]
+    kind = (STAGES | ACQUISITION | MECHANICS)[name]
     random = stream("textbook " + name, seed)
     rate = float(random.choice([1000.0, 2000.0, 4000.0]))
     if kind.seconds:
