@@ -24,6 +24,7 @@ MORE = [
     *(("hydraulic", 1001), ("hydraulic", 2004), ("hydraulic", 2005)),
     *(("maxwell-slip", 1002), ("self-heating", 1002), ("self-heating", 1003)),
     *(("self-heating", 5002), ("gain", 1003), ("clipped", 5001), ("tanks", 5003)),
+    ("hydraulic", 7001),
 ]
 INTEGRATING = ("motor", "hydraulic")
 # Their lags outlast the impulse response that the record affords.

@@ -5,6 +5,7 @@
 //! about its cause. The balance ([`super::force_balance`]) needs neither: mass, damping, stiffness and forces follow from it at once, and a fit
 //! begins there, without plays and deadzones.
 
+use super::examination::is_near;
 use super::force_balance::{Balance, balance, squares};
 use super::limits::limited;
 use super::outside::limits;
@@ -139,7 +140,7 @@ pub(super) struct Balanced {
 }
 
 /// What the balance says of a force inside the mechanics of a stage that integrates. A simulation adds up all forces that no model knows,
-/// and its error says little of one of them.
+/// and its error says little of one of them, unless the model is near the noise: then a force is judged by its error as any other effect.
 pub(super) fn balanced(state: &SearchState, trial: &Trial) -> Result<Option<Balanced>, Error> {
     let point = &trial.point;
     let place = point.effects.iter().rposition(|effect| effect.name() == trial.entry.name);
@@ -147,7 +148,7 @@ pub(super) fn balanced(state: &SearchState, trial: &Trial) -> Result<Option<Bala
     let Some(closed) = closed.filter(|_| state.prepared.record.outputs().len() == 1) else {
         return Ok(None);
     };
-    if !state.integrates()? {
+    if !state.integrates()? || is_near(state, &state.point)? {
         return Ok(None);
     }
     let (record, delay) = (&state.prepared.record, point.dynamics.delay);
