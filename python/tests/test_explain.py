@@ -176,7 +176,7 @@ def test_plays_are_chosen_anew_beside_an_effect_that_is_found(seed, effects, mos
         (1198, {"gain-drift", "stiffness", "drift"}, 1.02),
     ],
 )
-def test_small_effects_beside_others_are_named(seed, lacking, most):
+def test_all_that_is_lacking_is_named(seed, lacking, most):
     plant = plants.draw(seed, tuple(sorted(lacking)), None, 30.0)
     found = gpi.explain(record_of(plant.record(0)))
     assert set(found.effects) == lacking

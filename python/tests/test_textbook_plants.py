@@ -18,6 +18,8 @@ SEEDS = (1000, 1001)
 # A gain that the losses of the drive change does not drift.
 # Errors of the model at the turning points of the input are no coloured noise.
 # The overlap of a valve is a dead band of the declared model, and no friction.
+# A few clipped samples of a stage that rings are no stiffness, and a saturation that no machine has no noise.
+# A force that changes the error by nothing is no friction.
 MORE = [
     *(("maxwell-slip", 1009), ("motor", 3002), ("lagged-leak", 1005), ("heater", 1003)),
     *(("clipped", 2000), ("tanks", 2002), ("tanks", 2004)),

@@ -24,7 +24,6 @@
 //! - The a_i also predict the noise at rest or between repeated periods, where the record has them: the error of a model is
 //!   not there when nothing moves.
 
-use super::examination::is_near;
 use super::finish::refined;
 use super::noise::{is_alone, memory};
 use super::residual::{PREDICTION, STRUCTURE, WHITENESS, tests_of};
@@ -62,7 +61,7 @@ pub(super) fn search_weighed<'a>(
     } else if errs_less(&latest, state)? {
         let mut next = latest.under(state.setup)?;
         run(&mut next, progress)?;
-        if next.cost < state.cost && is_near(&next, &next.point)? {
+        if next.cost < state.cost && next.is_near(&next.point)? {
             *state = next;
         }
     }

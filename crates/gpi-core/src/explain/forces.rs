@@ -5,7 +5,6 @@
 //! about its cause. The balance ([`super::force_balance`]) needs neither: mass, damping, stiffness and forces follow from it at once, and a fit
 //! begins there, without plays and deadzones.
 
-use super::examination::is_near;
 use super::force_balance::{Balance, balance, squares};
 use super::limits::limited;
 use super::outside::limits;
@@ -148,7 +147,7 @@ pub(super) fn balanced(state: &SearchState, trial: &Trial) -> Result<Option<Bala
     let Some(closed) = closed.filter(|_| state.prepared.record.outputs().len() == 1) else {
         return Ok(None);
     };
-    if !state.integrates()? || is_near(state, &state.point)? {
+    if !state.integrates()? || state.is_near(&state.point)? {
         return Ok(None);
     }
     let (record, delay) = (&state.prepared.record, point.dynamics.delay);

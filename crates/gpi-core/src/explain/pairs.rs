@@ -8,7 +8,6 @@
 //! - The model with both is near the noise on what is held out: far from it, two effects follow any structure.
 //! - The held-out blocks confirm both together, and the first beside the second. The second one was confirmed beside the first.
 
-use super::examination::is_near;
 use super::judgement::is_confirmed;
 use super::round::{add, round};
 use super::state::{Addition, SearchState};
@@ -33,7 +32,7 @@ pub(super) fn add_pair(state: &mut SearchState, progress: Progress) -> Result<bo
     next.unconfirmed = None;
     let place = next.point.effects.iter().rposition(|effect: &Effect| effect.name() == entry.name);
     let Some(place) = place else { return Ok(false) };
-    if next.point.effects.len() < count + 2 || !is_near(&next, &next.point)? {
+    if next.point.effects.len() < count + 2 || !next.is_near(&next.point)? {
         return Ok(false);
     }
     let (without, _) = next.best_without(place, progress)?;

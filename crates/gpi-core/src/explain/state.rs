@@ -293,6 +293,15 @@ impl<'a> SearchState<'a> {
         Ok(squares.sum::<f64>() * record.scored() as f64)
     }
 
+    /// Whether a model is near the noise on what is held out.
+    pub(super) fn is_near(&self, point: &Point) -> Result<bool, Error> {
+        let test = self.setup.test.scored().max(1) as f64;
+        let trained = self.prepared.record.scored().max(1) as f64;
+        let noise = self.noise_squares()? / trained;
+        let most = self.setup.policy.examination.near.powi(2) * noise;
+        Ok(self.held_out(point)?.iter().sum::<f64>() / test <= most)
+    }
+
     /// Whether a fit without a part of the model leaves hardly more of the training and of the held-out squares.
     pub(super) fn explains_nearly_as_much(&self, fitted: &Fitted) -> Result<bool, Error> {
         let most = 1.0 + self.setup.policy.revision.negligible;

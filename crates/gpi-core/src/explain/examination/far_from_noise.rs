@@ -54,7 +54,7 @@ pub(super) fn doubt(
             | Place::Added(_)
     );
     if let Place::Curves(_) = of {
-        let adds_up = state.integrates()? && !is_near(state, point)?;
+        let adds_up = state.integrates()? && !state.is_near(point)?;
         return Ok(adds_up.then_some(Refusal::ResemblesMisfit));
     }
     if !is_asked || entry.signature == Signature::Unique || entry.free_order == FreeOrder::JoinsG {
@@ -67,7 +67,7 @@ pub(super) fn doubt(
         let most = part.max(policy.left_at_most);
         Ok::<bool, Error>(state.cost > part * cost || held_out(point)? > most * held_out(&without)?)
     };
-    if is_near(state, point)? {
+    if state.is_near(point)? {
         Ok(None)
     } else if exceedances(&of, &state.prepared.record).is_some_and(|n| n < policy.exceedances) {
         Ok(Some(Refusal::TooRare))
@@ -100,15 +100,6 @@ pub(super) fn doubt(
     } else {
         Ok(None)
     }
-}
-
-/// Whether a model is near the noise on what is held out.
-pub(in crate::explain) fn is_near(state: &SearchState, point: &Point) -> Result<bool, Error> {
-    let test = state.setup.test.scored().max(1) as f64;
-    let trained = state.prepared.record.scored().max(1) as f64;
-    let noise = state.noise_squares()? / trained;
-    let most = state.setup.policy.examination.near.powi(2) * noise;
-    Ok(state.held_out(point)?.iter().sum::<f64>() / test <= most)
 }
 
 /// How many times the input is faster than an input stage passes unchanged, for one sample or several in a row; `None`

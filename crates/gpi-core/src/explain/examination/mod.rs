@@ -35,8 +35,6 @@ mod gaps;
 mod own_part;
 mod within_limits;
 
-pub(super) use far_from_noise::is_near;
-
 use super::judgement::{Evidence, judge};
 use super::outside::saturates;
 use super::refusal::Refusal;
@@ -124,7 +122,7 @@ pub(super) fn doubt(
     // where the output integrates the input, forces are judged by their balance
     let is_balanced =
         matches!(point.effects[place].place(), Place::Loops(_)) && state.integrates()?;
-    let is_large = effect.limits() && !far_from_noise::is_near(state, point)?;
+    let is_large = effect.limits() && !state.is_near(point)?;
     // what a slow function of time does beyond the bounds of a slower creep, for example, says nothing of its cause
     if !is_balanced
         && !is_large

@@ -12,8 +12,9 @@ settings! {
         /// Part of a whitened residual's variance that the input may predict for the search to go on in this way. By hand: more is
         /// the error of a model beside a little noise.
         predictable: f64 = 0.1, PART;
-        /// Part by which the rms residual may grow there, and by which it must fall for the search to go on from there. By hand: it grew by less than 1 % on a stage with 1/f noise and a drifting
-        /// gain, and by 12 % where a smooth error of the model passed for noise.
+        /// Part by which the rms residual may grow there, and by which it must fall for the search to go on from there. By hand: it
+        /// grew by less than 1 % on a stage with 1/f noise and a drifting gain, and by 12 % where a smooth error of the model passed
+        /// for noise.
         grown: f64 = 0.05, PART;
         /// Fewer wrong samples may be noise, or come from the way in which a record was cut. By hand.
         fewest: usize = 3, FROM_ONE;
