@@ -20,13 +20,14 @@ SEEDS = (1000, 1001)
 # The overlap of a valve is a dead band of the declared model, and no friction.
 # A few clipped samples of a stage that rings are no stiffness, and a saturation that no machine has no noise.
 # A force that changes the error by nothing is no friction.
+# A stage that stands at its sensor's limit while the drive rests has no spring. What jumps does not drift.
 MORE = [
     *(("maxwell-slip", 1009), ("motor", 3002), ("lagged-leak", 1005), ("heater", 1003)),
     *(("clipped", 2000), ("tanks", 2002), ("tanks", 2004)),
     *(("hydraulic", 1001), ("hydraulic", 2004), ("hydraulic", 2005)),
     *(("maxwell-slip", 1002), ("self-heating", 1002), ("self-heating", 1003)),
     *(("self-heating", 5002), ("gain", 1003), ("clipped", 5001), ("tanks", 5003)),
-    ("hydraulic", 7001),
+    *(("hydraulic", 7001), ("clipped", 7001), ("burst", 7000)),
 ]
 INTEGRATING = ("motor", "hydraulic")
 # Their lags outlast the impulse response that the record affords.
@@ -45,12 +46,13 @@ def test_nothing_false_is_named(name: str, seed: int) -> None:
     assert "integrates" not in reason or name in INTEGRATING
 
 
-# Later fits bring lags of the other direction. An unknown initial state leaves more than the hum.
-NAMED = [("log-creep", 1003), ("hum", 1001)]
+# Later fits bring lags of the other direction. An unknown initial state leaves more than the hum. Before the drift is known, stops
+# resemble the stage better than plays do.
+NAMED = [("log-creep", 1003), ("hum", 1001), ("thermal", 8000)]
 
 
 @pytest.mark.parametrize(("name", "seed"), NAMED)
-def test_what_must_be_named_is_named_in_motion(name: str, seed: int) -> None:
+def test_what_must_be_named_is_named(name: str, seed: int) -> None:
     label, run = textbook.STAGES[name], textbook.draw(name, seed)
     found = gpi.explain(gpi.Record(run.u, run.y, rate=run.rate))
     assert set(found.effects) == label.must

@@ -14,6 +14,9 @@
 //! 4. Steps 2 and 3 are repeated until no effect is accepted. Then an effect that the input drives replaces a slow
 //!    function of time that it explains as well, forces inside the mechanics enter where the input does if that explains nearly as
 //!    much (`force_at_input`), and the residual is tested for remaining structure (`residual`).
+//! 5. Stops instead of plays were found to fit the record better before any effect was known, and a drift, for example, makes a stage
+//!    resemble a bank of stops. If the declared model has stops and the residual still has structure, everything is done once more
+//!    beside plays. Their answer is given if it leaves no structure.
 //!
 //! The files import in one direction only: `policy` (every tolerance), `threshold`, `judgement`, `choice`, `base`, `projection`,
 //! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `sensor_range`, `trial`,
@@ -59,6 +62,7 @@ mod threshold;
 mod trial;
 mod verdict;
 
+use crate::chain::hysteresis::{Elements, Parameters};
 use crate::effects::OutputKind;
 use crate::fit::RefineOptions;
 use crate::fit::preparation::starts_at_rest;
@@ -68,7 +72,7 @@ use crate::identify::{Grid, IdentifyOptions, Progress, Quick, Report};
 use crate::progress::{Overall, ProgressSettings};
 use crate::spectrum::is_one_sine;
 use crate::uncertainty::outliers;
-use crate::{Error, Matrix, Record};
+use crate::{Error, Hysteresis, Matrix, Record};
 use explanation::summarise;
 pub use explanation::{Errors, Explanation, Step};
 use finish::finish;
@@ -118,8 +122,41 @@ pub fn explain(
     options: &ExplainOptions,
     progress: Progress,
 ) -> Result<Explanation, Error> {
+    let steps = ProgressSettings::usual()?;
+    let mut overall = Overall::new(progress, steps.light, steps.declared, steps.declaring);
+    let mut found = explain_once(record, holdout, options, &mut overall)?;
+    // stops were compared with plays before any effect was known
+    let elements = |own: &Hysteresis| Parameters::from_operator(own).elements;
+    let has_stops = found.model.hysteresis().iter().map(elements).any(|own| own == Elements::Stops);
+    let is_open = !found.interrupted && found.verdict != Verdict::Explained;
+    if has_stops && is_open && options.identify.elements.is_none() {
+        let identify =
+            IdentifyOptions { elements: Some(Elements::Plays), ..options.identify.clone() };
+        let options = ExplainOptions { identify, ..options.clone() };
+        match explain_once(record, holdout, &options, &mut overall) {
+            Ok(other) if other.verdict == Verdict::Explained => found = other,
+            Ok(other) => found.interrupted = other.interrupted,
+            Err(Error::Interrupted) => found.interrupted = true,
+            // the structure of stops stands
+            Err(_) => {}
+        }
+    }
+    if !found.interrupted {
+        overall.finish();
+    }
+    Ok(found)
+}
+
+/// One search, beside the declared model that `options` ask for.
+fn explain_once(
+    record: &Record,
+    holdout: Option<&Record>,
+    options: &ExplainOptions,
+    overall: &mut Overall,
+) -> Result<Explanation, Error> {
     let policy = SearchPolicy::default();
     policy.validate()?;
+    let steps = ProgressSettings::usual()?;
     let allowed = setup::allowed("effects", options.effects.as_deref())?;
     let required = setup::allowed("require", Some(&options.require))?;
     record.require_moving()?;
@@ -131,8 +168,6 @@ pub fn explain(
     let outputs: Vec<Matrix> = training.experiments().iter().map(|e| e.output.clone()).collect();
     let spikes = outliers::places(&outputs, &repair::everything(&training)?, 0);
     let training = repair::repaired(&training, &outputs, &spikes)?;
-    let steps = ProgressSettings::usual()?;
-    let mut overall = Overall::new(progress, steps.light, steps.declared, steps.declaring);
     let mut prepared = prepare(&training, &identify)?;
     let measured = as_measured(&prepared.record, record, &prepared.means)?;
     let mut progress = |report: &Report| overall.take(report);
@@ -195,9 +230,6 @@ pub fn explain(
         None
     };
     let found = summarise(record, holdout, &base, state, refinement, interrupted)?;
-    if !interrupted {
-        overall.finish();
-    }
     let estimates = found.refinement.estimates(&found.model)?;
     let model = found.model.clone().with_estimates(estimates);
     Ok(Explanation { moved_resonance, model, ..found })

@@ -33,7 +33,9 @@ pub(super) enum Refusal {
     AsFastAsLags,
     /// It is a function of time that changes when the motion of the input does.
     FollowsInput,
-    /// A function of time that changes when the motion of the input does explains more.
+    /// It is a smooth function of time, and levels between jumps explain more.
+    Jumps,
+    /// A function of time that was refused for what it follows explains more.
     Surpassed,
     /// It is a function of time that leaves much of an error that is far above the noise.
     FollowsTheRest,
@@ -85,6 +87,9 @@ impl Refusal {
             }
             Self::FollowsInput => {
                 "is a function of time that follows how the input moves, so that the input causes what it explains".to_owned()
+            }
+            Self::Jumps => {
+                "is a smooth function of time, and what it follows jumps from one level to another".to_owned()
             }
             Self::Surpassed => "explains less than a function of time that was refused".to_owned(),
             Self::FollowsTheRest => {

@@ -68,8 +68,8 @@ fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
         let entry = state.point.effects[place].entry();
         let [_, holdout_rms] = state.rms(&state.point)?;
         match why {
-            Refusal::FollowsInput => {
-                state.follows_input = state.follows_input.min(holdout_rms);
+            Refusal::FollowsInput | Refusal::Jumps => {
+                state.follows = state.follows.min(holdout_rms);
             }
             Refusal::Gaps => state.misses_gaps = state.misses_gaps.min(holdout_rms),
             _ => {}

@@ -16,7 +16,7 @@ use crate::identify::long_record::compare;
 use crate::identify::procedure::prepare;
 use crate::identify::{IdentifyOptions, Quick};
 use crate::progress::Progress;
-use crate::{Error, Record};
+use crate::{Error, Experiment, Matrix, Record};
 
 /// The declared model of a record of one output, of which a part stands at a limit, with the sensor's range; `None` of other records,
 /// and where the rest of the samples shows no model. The outputs of the model are without `means`, those of the record are not.
@@ -82,9 +82,29 @@ pub(super) fn candidate(state: &SearchState) -> Result<Option<Ranked>, Error> {
     if !is_allowed || is_refused || !state.point.effects.is_empty() {
         return Ok(None);
     }
-    let gain = 1.0 - state.training_squares(start)? / state.cost;
+    let start = begun(start.clone(), &state.prepared.record)?;
+    let gain = 1.0 - state.training_squares(&start)? / state.cost;
     let columns = effect.values().len();
     let score = Score { start: effect.clone(), zero: None, gain, columns };
-    let start = Some(start.clone());
-    Ok(Some(Ranked { entry, score, worth: gain, start, others: Vec::new() }))
+    Ok(Some(Ranked { entry, score, worth: gain, start: Some(start), others: Vec::new() }))
+}
+
+/// A point whose experiments begin at equilibrium where that leaves smaller squares than the state found. The samples of an experiment
+/// that begins at a limit hardly depend on its initial state, so that a fit to the others may make it arbitrarily large, and a fit
+/// to all samples would not find back.
+fn begun(mut point: Point, record: &Record) -> Result<Point, Error> {
+    let mut still = point.clone();
+    still.pasts.iter_mut().for_each(|past| past.state.fill(0.0));
+    let squares = |residual: &Matrix, run: &Experiment| -> f64 {
+        run.scored_runs().flatten().map(|k| residual[(k, 0)].powi(2)).sum()
+    };
+    let residuals = point.residuals(record)?.into_iter().zip(still.residuals(record)?);
+    let known = residuals.zip(record.experiments());
+    for (past, ((found, still), run)) in point.pasts.iter_mut().zip(known) {
+        if squares(&still, run) < squares(&found, run) {
+            past.state.fill(0.0);
+            past.has_unknown_state = false;
+        }
+    }
+    Ok(point)
 }

@@ -124,8 +124,9 @@ pub(super) struct SearchState<'a> {
     pub unconfirmed: Option<Trial>,
     /// What was taken and did not pass the last examination.
     pub refused: Vec<Rejected>,
-    /// The smallest held-out rms error with a slow function of time that follows the input's motion; infinite without one.
-    pub follows_input: f64,
+    /// The smallest held-out rms error with a slow function of time that follows the input's motion, or a signal that jumps; infinite
+    /// without one.
+    pub follows: f64,
     /// The same with one that does not predict gaps between its knots.
     pub misses_gaps: f64,
     /// The same with an effect that the input drives and that no machine can have.
@@ -154,7 +155,7 @@ impl<'a> SearchState<'a> {
             last: Vec::new(),
             unconfirmed: None,
             refused: Vec::new(),
-            follows_input: f64::INFINITY,
+            follows: f64::INFINITY,
             misses_gaps: f64::INFINITY,
             impossible: f64::INFINITY,
             balanced_beside: None,
@@ -179,7 +180,7 @@ impl<'a> SearchState<'a> {
             unconfirmed: None,
             refused: self.refused.clone(),
             // errors under another loss are not comparable
-            follows_input: f64::INFINITY,
+            follows: f64::INFINITY,
             misses_gaps: f64::INFINITY,
             impossible: f64::INFINITY,
             balanced_beside: None,

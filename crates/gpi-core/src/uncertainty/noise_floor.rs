@@ -13,7 +13,8 @@
 //! rest; the third assumes white noise and a model error that is small near half the sampling rate (P. Welch, 1967).
 //! A rest in which the output still moves has a larger variance than the quietest one: with f degrees of freedom the
 //! ratio of two variances of Gaussian noise is `1 +- sqrt(2 / f1 + 2 / f2)`, and rests beyond four such standard errors are
-//! left out.
+//! left out. So are rests in which the measured output is constant: a sensor that is coarser than its noise, or at the end of its
+//! range, does not show the noise.
 
 use super::settings::NoiseFloorSettings;
 use crate::{Experiment, Matrix, Record};
@@ -105,9 +106,13 @@ impl NoiseFloor {
                 rests(experiment).into_iter().filter(|(a, b)| b - a >= settings.rest)
             {
                 let rows = (end - start) / 2;
-                let output = residual.rows(end - rows, rows);
-                let squares = output.column_iter().map(|column| around_a_line(&column.into()));
-                found.push((DVector::from_iterator(output.ncols(), squares), rows as f64 - 2.0));
+                let measured = experiment.output.rows(end - rows, rows);
+                if measured.column_iter().any(|column| column.iter().all(|&y| y == column[0])) {
+                    continue;
+                }
+                let own = residual.rows(end - rows, rows);
+                let squares = own.column_iter().map(|column| around_a_line(&column.into()));
+                found.push((DVector::from_iterator(own.ncols(), squares), rows as f64 - 2.0));
             }
         }
         // The output may still ring or creep in some: they are louder than the quietest one.
@@ -122,9 +127,8 @@ impl NoiseFloor {
             found.iter().fold(DVector::zeros(record.outputs().len()), |sum, rest| sum + &rest.0);
         let samples = freedom as usize + 2 * found.len();
         let rms: Vec<f64> = squares.iter().map(|sum| (sum / freedom).sqrt()).collect();
-        // A sensor whose output is constant (its quantization is coarser than its noise) does not show its noise.
-        let useful = samples >= settings.samples && rms.iter().all(|&value| value > 0.0);
-        useful.then_some(Self { rms, method: NoiseMethod::Rests { samples } })
+        (samples >= settings.samples)
+            .then_some(Self { rms, method: NoiseMethod::Rests { samples } })
     }
 
     /// White noise that has the residual's power density above three quarters of half the rate, from
@@ -259,5 +263,22 @@ mod tests {
         for floor in [periodic, stairs, other] {
             assert!((floor.rms[0] / 0.1 - 1.0).abs() < 0.06, "{floor:?}");
         }
+    }
+
+    #[test]
+    fn a_rest_at_the_end_of_the_sensors_range_shows_no_noise() {
+        let e = noise(6000, 4711.0);
+        let u: Vec<f64> = (0..6000).map(|k| f64::from(k / 600)).collect();
+        let of = |most: f64| {
+            let y: Vec<f64> = u.iter().zip(&e).map(|(u, e)| (u + 0.1 * e).min(most)).collect();
+            let residual = y.iter().zip(&u).map(|(y, u)| y - u.min(most));
+            let residual = vec![Matrix::from_iterator(6000, 1, residual)];
+            NoiseFloor::estimate(&record(&u, &y), &residual)
+        };
+        // all rests but the last two are within the range
+        let floor = of(7.5);
+        assert_eq!(floor.method, NoiseMethod::Rests { samples: 2400 });
+        assert!((floor.rms[0] / 0.1 - 1.0).abs() < 0.06, "{floor:?}");
+        assert_eq!(of(-1.0).method, NoiseMethod::HighFrequencyResidual);
     }
 }

@@ -16,8 +16,8 @@
 //!    stage that integrates its input is not asked: the error of a simulation is there the sum of all small forces. Nor are limits of
 //!    states, while the model is far from the noise: what they do is no small change of the rest.
 //! 4. *Slow*: a slow function of time is slower than the lags of G that carry a part of the movement, predicts gaps between its
-//!    knots as well as it fits ([`gaps`]), and does not follow how the input moves ([`follows_input`]). Where one does, the input changes
-//!    the gain, and neither another one nor a shape of loops is named that leaves a larger error. Nor is a shape of loops that
+//!    knots as well as it fits ([`gaps`]), is smooth ([`jumps`]), and does not follow how the input moves ([`follows_input`]). Where one follows
+//!    the input or jumps, neither another one nor a shape of loops is named that leaves a larger error. Nor is a shape of loops that
 //!    leaves a larger error than a slow function of time that failed to predict gaps.
 //! 5. *Small, or at the noise*: an effect that is a large part of the output, acts a few times only, or acts like a misfit
 //!    of the hysteresis has brought the model near the noise ([`far_from_noise`]). Where it leaves much unexplained, it
@@ -32,6 +32,7 @@ mod contribution;
 mod far_from_noise;
 mod follows_input;
 mod gaps;
+mod jumps;
 mod own_part;
 mod within_limits;
 
@@ -119,6 +120,9 @@ pub(super) fn doubt(
     if is_slow && follows_input::follows_input(&state.prepared.record, point, place, policy) {
         return Ok(Some(Refusal::FollowsInput));
     }
+    if is_slow && jumps::is_of_jumps(&state.prepared.record, point, place, policy.jumping)? {
+        return Ok(Some(Refusal::Jumps));
+    }
     // where the output integrates the input, forces are judged by their balance
     let is_balanced =
         matches!(point.effects[place].place(), Place::Loops(_)) && state.integrates()?;
@@ -139,8 +143,8 @@ pub(super) fn doubt(
     }
     // the gain of another shape of loops depends on their amplitude, too
     let least = match effect.place() {
-        Place::Curves(_) => state.follows_input.min(state.misses_gaps),
-        _ if is_slow => state.follows_input,
+        Place::Curves(_) => state.follows.min(state.misses_gaps),
+        _ if is_slow => state.follows,
         _ => f64::INFINITY,
     };
     if least.is_finite() && state.rms(point)?[1] >= least {

@@ -67,6 +67,9 @@ settings! {
         /// Rms error inside the gaps over that of the fit. On records of known truth, true functions of time have 1.00 to 1.12,
         /// most false ones 1.5 to 33.
         bridged: f64 = 1.25, FROM_ONE;
+        /// Part of a drift's squares above white noise that levels between jumps may leave for it not to be named. By hand: levels that
+        /// follow true jumps leave hardly any, and the curve of a random walk leaves about as many as levels do.
+        jumping: f64 = 0.5, PART;
         /// Probability with which a function of time that does not depend on the input is said to follow its motion, for all tests
         /// together. By hand: such an error should be much rarer than a true drift.
         followed: f64 = 1e-4, PART;
