@@ -83,7 +83,7 @@ pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Resu
             && is_superfluous(lost, threshold, [&held_out, &trial.held_out], factor)
         {
             let dropped = vec![slow.name];
-            state.add(Addition { trial, others: Vec::new(), probability: None, dropped })?;
+            state.add(Addition { dropped, ..Addition::alone(trial) })?;
             // the grids were placed, and the effect's terms counted, beside the slow function
             state.is_rich = false;
             is_replaced = true;
@@ -215,7 +215,7 @@ pub(super) fn exchange_slow(state: &mut SearchState, progress: Progress) -> Resu
         let lost = lost(state, &trial, &held_out) + more;
         if -lost > 2.0 * state.setup.policy.judgement.looks.ln() {
             let dropped = vec![own.name];
-            state.add(Addition { trial, others: Vec::new(), probability: None, dropped })?;
+            state.add(Addition { dropped, ..Addition::alone(trial) })?;
         }
     }
     Ok(())

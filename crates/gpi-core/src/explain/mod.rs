@@ -58,21 +58,22 @@ mod setup;
 mod slip;
 mod state;
 mod steps;
+mod surpassing;
 mod threshold;
 mod trial;
 mod verdict;
 
-use crate::chain::hysteresis::{Elements, Parameters};
+use crate::chain::hysteresis::Elements;
 use crate::effects::OutputKind;
 use crate::fit::RefineOptions;
 use crate::fit::preparation::starts_at_rest;
 use crate::identify::long_record::compare;
-use crate::identify::procedure::prepare;
+use crate::identify::procedure::{Compared, prepare};
 use crate::identify::{Grid, IdentifyOptions, Progress, Quick, Report};
 use crate::progress::{Overall, ProgressSettings};
 use crate::spectrum::is_one_sine;
 use crate::uncertainty::outliers;
-use crate::{Error, Hysteresis, Matrix, Record};
+use crate::{Error, Matrix, Record};
 use explanation::summarise;
 pub use explanation::{Errors, Explanation, Step};
 use finish::finish;
@@ -124,18 +125,16 @@ pub fn explain(
 ) -> Result<Explanation, Error> {
     let steps = ProgressSettings::usual()?;
     let mut overall = Overall::new(progress, steps.light, steps.declared, steps.declaring);
-    let mut found = explain_once(record, holdout, options, &mut overall)?;
-    // stops were compared with plays before any effect was known
-    let elements = |own: &Hysteresis| Parameters::from_operator(own).elements;
-    let has_stops = found.model.hysteresis().iter().map(elements).any(|own| own == Elements::Stops);
+    let (mut found, of_plays) = explain_once(record, holdout, options, &mut overall)?;
     let is_open = !found.interrupted && found.verdict != Verdict::Explained;
-    if has_stops && is_open && options.identify.elements.is_none() {
+    // stops were compared with plays before any effect was known
+    if is_open && of_plays.is_some_and(|part| part > GridPolicy::default().of_plays) {
         let identify =
             IdentifyOptions { elements: Some(Elements::Plays), ..options.identify.clone() };
         let options = ExplainOptions { identify, ..options.clone() };
         match explain_once(record, holdout, &options, &mut overall) {
-            Ok(other) if other.verdict == Verdict::Explained => found = other,
-            Ok(other) => found.interrupted = other.interrupted,
+            Ok((other, _)) if other.verdict == Verdict::Explained => found = other,
+            Ok((other, _)) => found.interrupted = other.interrupted,
             Err(Error::Interrupted) => found.interrupted = true,
             // the structure of stops stands
             Err(_) => {}
@@ -147,13 +146,14 @@ pub fn explain(
     Ok(found)
 }
 
-/// One search, beside the declared model that `options` ask for.
+/// One search, beside the declared model that `options` ask for, and the part of the squares of plays that the model leaves where it has
+/// stops although plays were compared.
 fn explain_once(
     record: &Record,
     holdout: Option<&Record>,
     options: &ExplainOptions,
     overall: &mut Overall,
-) -> Result<Explanation, Error> {
+) -> Result<(Explanation, Option<f64>), Error> {
     let policy = SearchPolicy::default();
     policy.validate()?;
     let steps = ProgressSettings::usual()?;
@@ -171,7 +171,8 @@ fn explain_once(
     let mut prepared = prepare(&training, &identify)?;
     let measured = as_measured(&prepared.record, record, &prepared.means)?;
     let mut progress = |report: &Report| overall.take(report);
-    let mut refined = compare(&mut prepared, &identify, Some(quick), &mut progress)?.refined;
+    let Compared { mut refined, of_plays, .. } =
+        compare(&mut prepared, &identify, Some(quick), &mut progress)?;
     refined.drop_undetermined(&prepared, &mut progress)?;
     let clipping = sensor_range::clipping(
         &training,
@@ -232,7 +233,7 @@ fn explain_once(
     let found = summarise(record, holdout, &base, state, refinement, interrupted)?;
     let estimates = found.refinement.estimates(&found.model)?;
     let model = found.model.clone().with_estimates(estimates);
-    Ok(Explanation { moved_resonance, model, ..found })
+    Ok((Explanation { moved_resonance, model, ..found }, of_plays))
 }
 
 /// The record with blocks of its time held out, as [`explain`] does it: ten blocks of each experiment, a fifth of its time.

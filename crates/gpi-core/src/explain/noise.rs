@@ -110,8 +110,9 @@ pub(super) fn memory(
 ) -> Option<ColouredNoise> {
     let policy = &state.setup.policy.noise;
     let falls = |before: f64, after: f64| after < (1.0 - policy.predicted) * before;
-    let follows_input =
-        state.rms(&state.point).is_ok_and(|[_, held_out]| falls(held_out, state.impossible));
+    let follows_input = state
+        .rms(&state.point)
+        .is_ok_and(|[_, held_out]| falls(held_out, state.surpassing.impossible));
     if follows_input || matches!(state.integrates(), Ok(true)) {
         return None;
     }

@@ -21,9 +21,7 @@ pub(super) fn add_pair(state: &mut SearchState, progress: Progress) -> Result<bo
     let entry = first.entry;
     let count = state.point.effects.len();
     let mut next = state.under(state.setup)?;
-    let addition =
-        Addition { trial: first, others: Vec::new(), probability: None, dropped: Vec::new() };
-    add(&mut next, addition, progress)?;
+    add(&mut next, Addition::alone(first), progress)?;
     for _ in 0..state.setup.policy.revision.rounds {
         if next.point.effects.len() > count + 1 || !round(&mut next, progress)? {
             break;

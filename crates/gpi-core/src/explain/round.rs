@@ -165,8 +165,8 @@ fn examined(
         }
         evidences[place].doubt = examined.refusal;
         let trial = &trials[place];
-        if trial.entry.driven && examined.refusal == Some(Refusal::Impossible) {
-            state.impossible = state.impossible.min(trial.rms[1]);
+        if let Some(why) = examined.refusal {
+            state.surpassing.note(trial.entry, why, trial.rms[1]);
         }
         let is_better = |one: &Fitted| {
             better.as_ref().is_none_or(|known| one.linearization.cost < known.linearization.cost)

@@ -67,13 +67,7 @@ fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
         }
         let entry = state.point.effects[place].entry();
         let [_, holdout_rms] = state.rms(&state.point)?;
-        match why {
-            Refusal::FollowsInput | Refusal::Jumps => {
-                state.follows = state.follows.min(holdout_rms);
-            }
-            Refusal::Gaps => state.misses_gaps = state.misses_gaps.min(holdout_rms),
-            _ => {}
-        }
+        state.surpassing.note(entry, why, holdout_rms);
         state.remove(place, progress)?;
         let why = why.in_words("the model");
         let (effect, confounded_with) = (entry.name, Vec::new());
@@ -117,5 +111,5 @@ pub(super) fn force(
     let trial = as_trial(progress, ("trials", entry.name), (0, 1), |progress| {
         trial(state, best, progress)
     })?;
-    state.add(Addition { trial, others: Vec::new(), probability: None, dropped: Vec::new() })
+    state.add(Addition::alone(trial))
 }

@@ -19,6 +19,7 @@ use super::outside::integrates;
 use super::repair::{everything, repaired};
 use super::score::Score;
 use super::setup::SearchSetup;
+use super::surpassing::Surpassing;
 use crate::chain::point::Point;
 use crate::effects::{Effect, Entry};
 use crate::fit::joint::Refined;
@@ -89,6 +90,13 @@ pub(super) struct Addition {
     pub dropped: Vec<&'static str>,
 }
 
+impl Addition {
+    /// A trial that is added whatever else was tried.
+    pub(super) fn alone(trial: Trial) -> Self {
+        Self { trial, others: Vec::new(), probability: None, dropped: Vec::new() }
+    }
+}
+
 /// The model before slow poles were taken out of its G.
 pub(super) struct BeforeLags {
     pub point: Point,
@@ -124,13 +132,8 @@ pub(super) struct SearchState<'a> {
     pub unconfirmed: Option<Trial>,
     /// What was taken and did not pass the last examination.
     pub refused: Vec<Rejected>,
-    /// The smallest held-out rms error with a slow function of time that follows the input's motion, or a signal that jumps; infinite
-    /// without one.
-    pub follows: f64,
-    /// The same with one that does not predict gaps between its knots.
-    pub misses_gaps: f64,
-    /// The same with an effect that the input drives and that no machine can have.
-    pub impossible: f64,
+    /// The errors with effects that were refused for what they follow.
+    pub surpassing: Surpassing,
     /// Names of the effects beside which the balance of forces was asked last.
     pub balanced_beside: Option<Vec<&'static str>>,
     /// Effects whose fits from the balance of forces ended far above the model.
@@ -155,9 +158,7 @@ impl<'a> SearchState<'a> {
             last: Vec::new(),
             unconfirmed: None,
             refused: Vec::new(),
-            follows: f64::INFINITY,
-            misses_gaps: f64::INFINITY,
-            impossible: f64::INFINITY,
+            surpassing: Surpassing::default(),
             balanced_beside: None,
             out_of_reach: BTreeSet::new(),
             integrates: OnceLock::new(),
@@ -180,9 +181,7 @@ impl<'a> SearchState<'a> {
             unconfirmed: None,
             refused: self.refused.clone(),
             // errors under another loss are not comparable
-            follows: f64::INFINITY,
-            misses_gaps: f64::INFINITY,
-            impossible: f64::INFINITY,
+            surpassing: Surpassing::default(),
             balanced_beside: None,
             out_of_reach: self.out_of_reach.clone(),
             integrates: self.integrates.clone(),

@@ -38,7 +38,9 @@ pub(super) fn compare_on_all(
     let stops =
         Error::unless_interrupted(compare_stops(prepared, options, quick, &policy, progress))?;
     match stops {
-        Ok(stops) if are_better(&stops, &plays, prepared, &policy) => Ok(stops),
+        Ok(stops) if are_better(&stops, &plays, prepared, &policy) => {
+            Ok(Compared { of_plays: Some(cost(&stops) / cost(&plays)), ..stops })
+        }
         _ => {
             prepared.channels = channels;
             prepared.notes.truncate(notes);

@@ -37,6 +37,8 @@ pub(crate) struct Compared {
     pub chosen: usize,
     pub refined: Refined,
     pub candidates: Vec<Candidate>,
+    /// Where stops were taken although plays were compared: the part of the squares of plays that they leave.
+    pub of_plays: Option<f64>,
     /// Whether the samples are few for the parameters of the best candidate.
     pub(super) is_crowded: bool,
     pub(super) quasi_static: bool,
@@ -182,7 +184,17 @@ fn compared(
             Error::parameter("half_widths", "none", "at least one structure is tried")
         }));
     };
-    Ok(Compared { chosen, refined, candidates, is_crowded, quasi_static, stages, supported })
+    let of_plays = None;
+    Ok(Compared {
+        chosen,
+        refined,
+        candidates,
+        of_plays,
+        is_crowded,
+        quasi_static,
+        stages,
+        supported,
+    })
 }
 
 /// The half-widths that are given, or as many as usual.

@@ -143,8 +143,8 @@ pub(super) fn doubt(
     }
     // the gain of another shape of loops depends on their amplitude, too
     let least = match effect.place() {
-        Place::Curves(_) => state.follows.min(state.misses_gaps),
-        _ if is_slow => state.follows,
+        Place::Curves(_) => state.surpassing.follows.min(state.surpassing.misses_gaps),
+        _ if is_slow => state.surpassing.follows,
         _ => f64::INFINITY,
     };
     if least.is_finite() && state.rms(point)?[1] >= least {

@@ -24,6 +24,9 @@ settings! {
         /// it. By hand: rich enough for a first model, cheap enough for a search that refines the grid later.
         half_widths: usize = 16, FROM_ONE;
         half_widths_in_motion: usize = 24, FROM_ONE;
+        /// Part of the squares of plays that stops leave at least for a search beside plays, if that beside stops leaves structure. By
+        /// hand, between a stage with a drift that resembles stops and a friction damper.
+        of_plays: f64 = 0.25, PART;
         /// Thresholds of a first model. By hand.
         thresholds: usize = 7, FROM_ONE;
         /// Times that plays and deadzones are added before effects are tried. By hand.
