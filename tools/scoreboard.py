@@ -112,7 +112,10 @@ def power_work(arguments: argparse.Namespace) -> Iterator[Job]:
 
 def textbook_work(arguments: argparse.Namespace) -> Iterator[Job]:
     """Yield some seeds of every stage of another textbook; every second one starts in motion."""
-    for stages, number in ((textbook.STAGES, arguments.textbook), (textbook.MECHANICS, arguments.mechanics)):
+    for stages, number in (
+        (textbook.ORDINARY, arguments.textbook),
+        (textbook.MECHANICS, arguments.mechanics),
+    ):
         for name in stages:
             # a whole name means this stage alone
             if arguments.only == name or (arguments.only not in stages and (arguments.only or "") in name):
@@ -156,7 +159,7 @@ def run(pool: Executor, work: Iterable[Job], kept: Kept) -> list[Result]:
 def reproduced(result: Result) -> str:
     """Return the command that explains the record of one textbook stage again."""
     seed = result.name.split(",")[0].split()[-1]
-    option = "textbook" if result.stage in textbook.STAGES else "mechanics"
+    option = "textbook" if result.stage in textbook.ORDINARY else "mechanics"
     return (
         f"python tools/scoreboard.py --no-records --plants 0 --{option} 1 --seed {seed} --only {result.stage}"
     )

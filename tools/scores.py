@@ -212,7 +212,7 @@ def within(drive: Callable[[int], NDArray[np.float64]], most: int = 30) -> int:
 
 def of_textbook(stage: str, seed: int) -> Result:
     """Explain one record of a stage of another textbook; the label says what must and what may be named."""
-    label = (textbook.STAGES | textbook.MECHANICS)[stage]
+    label = (textbook.ORDINARY | textbook.MECHANICS)[stage]
     number = within(lambda number: textbook.draw(stage, seed, number).u)
     one, two = (textbook.draw(stage, seed, number) for number in (0, number))
     record, again = (

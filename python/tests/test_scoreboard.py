@@ -187,7 +187,7 @@ def test_the_work_on_textbook_stages() -> None:
         return [values for _, values in scoreboard.textbook_work(asked)]
 
     every = names(None, 2, 1)
-    assert len(every) == 2 * len(textbook.STAGES) + len(textbook.MECHANICS)
+    assert len(every) == 2 * len(textbook.ORDINARY) + len(textbook.MECHANICS)
     assert every[:2] == [("clean", 10), ("clean", 11)]
     # a whole name means this stage alone, although it is also a part of another name
     assert names("leak", 1, 0) == [("leak", 10)]

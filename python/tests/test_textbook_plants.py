@@ -34,20 +34,17 @@ INTEGRATING = ("motor", "hydraulic")
 SLOW = [("tanks", 1003), ("tanks", 1004), ("tanks", 1005), ("heater", 1001)]
 
 
-ORDINARY = textbook.STAGES | textbook.ACQUISITION
-
-
-@pytest.mark.parametrize(("name", "seed"), [*itertools.product(ORDINARY, SEEDS), *MORE])
+@pytest.mark.parametrize(("name", "seed"), [*itertools.product(textbook.ORDINARY, SEEDS), *MORE])
 def test_nothing_false_is_named(name: str, seed: int) -> None:
-    label, run = ORDINARY[name], textbook.draw(name, seed)
+    label, run = textbook.ORDINARY[name], textbook.draw(name, seed)
     found = gpi.explain(gpi.Record(run.u, run.y, rate=run.rate, covariates=run.columns))
     assert set(found.effects) <= label.must | label.may
     reason = found.to_dict()["verdict_reason"] or ""
     assert "integrates" not in reason or name in INTEGRATING
 
 
-# Later fits bring lags of the other direction. An unknown initial state leaves more than the hum. Before the drift is known, stops
-# resemble the stage better than plays do.
+# Later fits bring lags of the other direction. An unknown initial state leaves more than the hum.
+# Before the drift is known, stops resemble the stage better than plays do.
 NAMED = [("log-creep", 1003), ("hum", 1001), ("thermal", 8000)]
 
 

@@ -49,7 +49,7 @@ def test_the_simulator_does_not_know_the_package() -> None:
     assert len(textbook.STAGES) >= 21
 
 
-@pytest.mark.parametrize("name", [*textbook.STAGES, *textbook.MECHANICS])
+@pytest.mark.parametrize("name", [*textbook.ORDINARY, *textbook.MECHANICS])
 def test_a_seed_is_one_stage_and_one_experiment(name: str) -> None:
     one, same, again, other = (textbook.draw(name, *seeds) for seeds in ((4,), (4,), (4, 1), (5,)))
     assert np.array_equal(one.u, same.u) and np.array_equal(one.y, same.y)

@@ -100,6 +100,9 @@ ACQUISITION: dict[str, Stage] = {
     "squared": stage(acquisition.squared, may=["output-nonlinearity", "hysteresis-shape"]),
 }
 
+#: All stages but those whose forces inside the mechanics are asked for beside other effects.
+ORDINARY: dict[str, Stage] = STAGES | ACQUISITION
+
 #: Forces inside the mechanics, alone and beside another effect.
 MECHANICS: dict[str, Stage] = {
     f"{name}+{other}": Stage(
@@ -130,7 +133,7 @@ def is_in_motion(seed: int) -> bool:
 
 def draw(name: str, seed: int, number: int = 0) -> Record:
     """Experiment `number` on the stage `name` of a seed."""
-    kind = (STAGES | ACQUISITION | MECHANICS)[name]
+    kind = (ORDINARY | MECHANICS)[name]
     random = stream("textbook " + name, seed)
     rate = float(random.choice([1000.0, 2000.0, 4000.0]))
     if kind.seconds:
