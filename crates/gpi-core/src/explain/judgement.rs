@@ -15,8 +15,8 @@
 //!    the training data, or by most of the squares of what the effect changes there, see [`is_seen`]. A model with fewer unknowns than the present one adds nothing that chance could use: of it, the fall of
 //!    the sum is enough, if it is substantial.
 //! 4. *Substantial*: far from the noise a bad fit resembles many effects a little, so a large part of the training
-//!    and of the held-out squares must go. Near the noise, a considerable part of those above the noise is enough, of the training data or
-//!    of what is held out. This is not asked of an effect whose signature no bad fit
+//!    and of the held-out squares must go. Near the noise, a considerable part of those above the noise is enough, of the training data and
+//!    what is held out together. This is not asked of an effect whose signature no bad fit
 //!    has, or of more of a driven effect that the model has already.
 
 use super::policy::JudgementPolicy;
@@ -141,13 +141,12 @@ fn is_weighty(trial: &Evidence, policy: &JudgementPolicy) -> bool {
     is_substantial(trial, policy) || is_near_noise || trial.is_unique || trial.is_more
 }
 
-/// Whether a trial takes a considerable part of the squares above the noise, of the training data or of what is held out.
+/// Whether a trial takes a considerable part of the squares above the noise, of the training data and what is held out together: either
+/// may show little of the effect.
 fn takes_much_of_the_rest(trial: &Evidence, policy: &JudgementPolicy) -> bool {
-    let takes = |[before, after]: [f64; 2], noise: f64| {
-        before - after > policy.beyond_rest * (after - noise)
-    };
-    let held_out = trial.held_out.map(|blocks| blocks.iter().sum());
-    takes(trial.squares, trial.noise) || takes(held_out, trial.held_out_noise)
+    let held_out = trial.held_out.map(|blocks| blocks.iter().sum::<f64>());
+    let [before, after] = [0, 1].map(|place| trial.squares[place] + held_out[place]);
+    before - after > policy.beyond_rest * (after - trial.noise - trial.held_out_noise)
 }
 
 /// Whether the held-out squares, block by block without and with an effect, have fallen significantly.
@@ -289,19 +288,18 @@ pub(super) mod tests {
             })
         };
         assert_eq!(small(|_| ()), Err(Refusal::Insubstantial));
-        // it takes 10, and leaves 19 or 21 above the noise
-        assert_eq!(small(|trial| trial.noise = 71.0), Ok(()));
-        assert_eq!(small(|trial| trial.noise = 69.0), Err(Refusal::Insubstantial));
-        // it takes 8, and leaves 15 or 17 above the noise of what is held out
-        let held_out = |noise| {
+        // it takes 10 of the training data and 8 of what is held out, and leaves 35 or 37 of both above the noise
+        let left = |noise, held_out| {
             judged(|trial| {
-                (trial.squares, trial.noise) = ([100.0, 90.0], 69.0);
+                trial.squares = [100.0, 90.0];
                 trial.held_out = [&BEFORE, &[8.0, 8.8, 7.2, 8.0]];
-                trial.held_out_noise = noise;
+                (trial.noise, trial.held_out_noise) = (noise, held_out);
             })
         };
-        assert_eq!(held_out(17.0), Ok(()));
-        assert_eq!(held_out(15.0), Err(Refusal::Insubstantial));
+        assert_eq!(left(86.0, 1.0), Ok(()));
+        assert_eq!(left(84.0, 1.0), Err(Refusal::Insubstantial));
+        assert_eq!(left(56.0, 31.0), Ok(()));
+        assert_eq!(left(56.0, 29.0), Err(Refusal::Insubstantial));
         let near = |noise| judged(|trial| (trial.squares, trial.noise) = ([300.0, 226.0], noise));
         assert_eq!(near(101.0), Ok(()));
         assert_eq!(near(100.0), Err(Refusal::Insubstantial), "more than 1.5 times its rms");
