@@ -162,10 +162,14 @@ def test_plays_are_chosen_anew_beside_an_effect_that_is_found(seed, effects, mos
 @pytest.mark.parametrize(
     ("seed", "lacking", "most"),
     [
+        # the search for coloured noise adds a hysteretic spring that the held-out data hardly show
+        (1037, {"stiffness", "amplifier-slew"}, 1.9),
         # a drift and two lags of G follow the creep at first
         (1098, {"covariate", "stiffness", "creep"}, 1.02),
         # creep takes the place of a drift, and then also explains what speed-dependent plays did beside it
         (1116, {"creep"}, 1.02),
+        # friction follows what the spring leaves in a few held-out blocks
+        (1135, {"stiffness"}, 1.1),
         # the held-out blocks do not confirm the shape of the loops before the gain's drift is known
         (1148, {"stiffness", "hysteresis-shape", "gain-drift"}, 1.1),
         # a wide hysteresis resembles an integral of the input, which a force in the mechanics would follow
