@@ -82,7 +82,7 @@ pub(super) fn candidate(state: &SearchState) -> Result<Option<Ranked>, Error> {
     if !is_allowed || is_refused || !state.point.effects.is_empty() {
         return Ok(None);
     }
-    let start = begun(start.clone(), &state.prepared.record)?;
+    let start = from_equilibrium(start.clone(), &state.prepared.record)?;
     let gain = 1.0 - state.training_squares(&start)? / state.cost;
     let columns = effect.values().len();
     let score = Score { start: effect.clone(), zero: None, gain, columns };
@@ -90,9 +90,9 @@ pub(super) fn candidate(state: &SearchState) -> Result<Option<Ranked>, Error> {
 }
 
 /// A point whose experiments begin at equilibrium where that leaves smaller squares than the state found. The samples of an experiment
-/// that begins at a limit hardly depend on its initial state, so that a fit to the others may make it arbitrarily large, and a fit
-/// to all samples would not find back.
-fn begun(mut point: Point, record: &Record) -> Result<Point, Error> {
+/// that begins at a limit hardly depend on its initial state. The fit to the other samples may make that state arbitrarily large, and a
+/// fit to all samples would not make it small again.
+fn from_equilibrium(mut point: Point, record: &Record) -> Result<Point, Error> {
     let mut still = point.clone();
     still.pasts.iter_mut().for_each(|past| past.state.fill(0.0));
     let squares = |residual: &Matrix, run: &Experiment| -> f64 {

@@ -1,8 +1,8 @@
 //! How small the error was with effects that were refused for what they follow.
 //!
-//! A slow function of time that follows the input, or a signal that jumps, and an effect with values that no machine has, are no
-//! causes. But what they explained has one. Another name for the same part of the residual is therefore not given if it explains
-//! less ([`super::examination`], [`super::noise`]).
+//! Some effects are refused although they explain a part of the residual: a slow function of time that follows the input or a signal
+//! that jumps, or an effect with values that no machine has. That part then has a cause which the catalogue does not contain. Another
+//! effect that explains less of it is therefore not named either ([`super::examination`], [`super::noise`]).
 
 use super::refusal::Refusal;
 use crate::effects::Entry;

@@ -66,7 +66,7 @@ impl NoiseFloor {
     ///
     /// Differences of the residual between repeated periods come first: `var(e(k + P) - e(k)) / 2`. Without
     /// repetitions the rests are taken: the second half of every stretch of at least 100 samples in
-    /// which no input changes, its straight line removed, those left out in which the output still rings.
+    /// which no input changes, its straight line removed, those left out in which the output still rings or is constant.
     /// Without rests it is the residual's power density near half the sampling rate.
     ///
     /// The residual, and not the output: the part of a disturbance that the model explains is not noise.

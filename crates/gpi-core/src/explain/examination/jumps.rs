@@ -1,7 +1,7 @@
 //! Whether what a drift explains changes in jumps.
 //!
 //! A slow function of time through many knots also follows a signal that jumps between levels: burst noise, a sensor that slips on its
-//! mount, a loose contact. A smooth curve then needs several knots for each jump, and levels need only the place and the height of it.
+//! mount, a loose contact. A smooth curve needs several knots for each jump. A step needs only its place and its height.
 //!
 //! With d what the drift adds to the output and e the residual of the model with it, what the drift is to explain is `d + e`. It is cut
 //! into pieces with a constant level each,
@@ -26,8 +26,8 @@ use crate::effects::Place;
 use crate::identify::NoiseFloor;
 use crate::{Error, Record};
 
-/// Whether levels between jumps leave at most `part` of the squares above the noise that the drift at a place leaves; false of any
-/// other effect.
+/// Whether levels between jumps leave less than `part` of the squares above the noise that the drift at a place leaves; false of an
+/// effect that is not added to the output.
 pub(super) fn is_of_jumps(
     record: &Record,
     point: &Point,
