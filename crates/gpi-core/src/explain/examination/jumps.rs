@@ -118,6 +118,55 @@ impl Piece {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::hysteresis::Parameters;
+    use crate::chain::point::Past;
+    use crate::effects::{Drift, Effect};
+    use crate::linear::{Sections, TransferFunction};
+    use crate::operators::Reading;
+    use crate::{Channel, Experiment, Intersample, Matrix};
+    use nalgebra::DVector;
+
+    /// Whether a drift of 16 knots, each at the value of `disturbance` there, is refused.
+    fn is_refused(disturbance: impl Fn(usize) -> f64) -> bool {
+        let samples = 801;
+        let u = Matrix::from_fn(samples, 1, |k, _| (0.3 * k as f64).sin());
+        let mut seed = 1_u64;
+        let y = Matrix::from_fn(samples, 1, |k, _| {
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            u[k] + disturbance(k) + 0.01 * ((seed >> 33) as f64 / f64::from(1_u32 << 30) - 1.0)
+        });
+        let knot = |j: usize| disturbance(50 * j) - disturbance(0);
+        let drift = Drift {
+            output: 0,
+            moves_stage: false,
+            changes: (1..=16).map(knot).collect(),
+            duration: samples as f64,
+            span: 2.0,
+        };
+        let gain = TransferFunction::new(&[1.0], &[1.0]).unwrap().to_state_space().unwrap();
+        let point = Point {
+            pasts: vec![Past { plays: None, has_unknown_state: false, state: DVector::zeros(0) }],
+            channels: vec![Parameters::identity(Reading::OneSided, vec![0.0], vec![0.0])],
+            dynamics: Sections::from_state_space(&gain, 0).unwrap(),
+            intersample: Intersample::default(),
+            effects: vec![Effect::from(drift)],
+            rate: 1.0,
+            offsets: vec![Matrix::from_element(1, 1, disturbance(0))],
+        };
+        let channel = |name| vec![Channel::new(name, "")];
+        let record =
+            Record::new(vec![Experiment::new(u, y)], 1.0, channel("u"), channel("y"), vec![]);
+        is_of_jumps(&record.unwrap(), &point, 0, 0.5).unwrap()
+    }
+
+    #[test]
+    fn levels_are_no_drift_and_a_smooth_curve_is_one() {
+        assert!(is_refused(|k| [0.0, 1.0, -0.5, 1.0, 0.0][k / 180]));
+        assert!(!is_refused(|k| (0.01 * k as f64).sin()));
+        assert!(!is_refused(|k| 1e-3 * k as f64));
+    }
 
     fn left(values: &[f64], jumps: usize) -> f64 {
         squares_of_levels(vec![Piece::of(values)], jumps)
