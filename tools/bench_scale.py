@@ -69,13 +69,10 @@ def main() -> None:
     parser.add_argument(
         "--long", type=int, nargs="*", default=[100_000, 1_000_000], help="samples of uncut records"
     )
-    parser.add_argument(
-        "--explained", type=int, nargs="*", default=[100_000, 1_000_000], help="samples of records to explain"
-    )
     parser.add_argument("--no-explain", action="store_true", help="time `identify` only")
     arguments = parser.parse_args()
     if not arguments.no_explain:
-        explained(arguments.explained)
+        explained(arguments.long)
     cases = [(arguments.samples, count) for count in arguments.experiments]
     cases += [(samples, 1) for samples in arguments.long]
     first = None

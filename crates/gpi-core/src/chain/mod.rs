@@ -71,6 +71,8 @@ mod jet;
 mod lanes;
 #[cfg(test)]
 pub(crate) mod looped;
+#[cfg(test)]
+pub(crate) mod plain;
 
 mod loops;
 mod memories;

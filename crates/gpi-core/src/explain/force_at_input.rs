@@ -76,18 +76,12 @@ fn with_input(point: &Point) -> Option<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::hysteresis::Parameters;
-    use crate::chain::point::Past;
-    use crate::effects::{Effect, Law, Sees, Stiffness};
-    use crate::linear::{Sections, TransferFunction};
-    use crate::operators::Reading;
-    use crate::{Intersample, Matrix};
-    use nalgebra::DVector;
+    use crate::Intersample;
+    use crate::chain::plain::plain;
+    use crate::effects::{Law, Sees, Stiffness};
 
     /// A resonance behind a dead time, with a cubic force and a damping.
     fn point(intersample: Intersample) -> Point {
-        let resonance = TransferFunction::new(&[0.3, 0.1], &[1.0, -1.6, 0.8]).unwrap();
-        let system = resonance.to_state_space().unwrap();
         let around = |law, drives: [f64; 2]| InnerLoop {
             sees: Sees::Output(0),
             law,
@@ -96,15 +90,10 @@ mod tests {
         let cubic = Law::Power { exponent: 3, scale: 0.5 };
         let loops =
             vec![around(cubic, [-0.04, -0.03]), around(Law::Damping { scale: 0.1 }, [0.01, 0.03])];
-        Point {
-            pasts: vec![Past { plays: None, has_unknown_state: false, state: DVector::zeros(2) }],
-            channels: vec![Parameters::identity(Reading::OneSided, vec![0.0], vec![0.0])],
-            dynamics: Sections::from_state_space(&system, 2).unwrap(),
-            intersample,
-            effects: vec![Effect::from(Stiffness { loops })],
-            rate: 1e3,
-            offsets: vec![Matrix::zeros(1, 1)],
-        }
+        let mut point = plain(&[0.3, 0.1], &[1.0, -1.6, 0.8], vec![Stiffness { loops }.into()]);
+        point.dynamics.delay = 2;
+        point.intersample = intersample;
+        point
     }
 
     #[test]

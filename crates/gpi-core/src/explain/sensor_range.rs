@@ -112,34 +112,22 @@ fn from_equilibrium(mut point: Point, record: &Record) -> Result<Point, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::hysteresis::Parameters;
-    use crate::chain::point::Past;
-    use crate::linear::{Sections, TransferFunction};
-    use crate::operators::Reading;
-    use crate::{Channel, Intersample};
-    use nalgebra::DVector;
+    use crate::Channel;
+    use crate::chain::plain::plain;
 
     #[test]
     fn a_state_that_makes_the_error_larger_is_that_of_equilibrium() {
-        let lag = TransferFunction::new(&[0.0, 0.3], &[1.0, -0.7]).unwrap();
-        let point = |state: f64| Point {
-            pasts: vec![Past {
-                plays: None,
-                has_unknown_state: true,
-                state: DVector::from_element(1, state),
-            }],
-            channels: vec![Parameters::identity(Reading::OneSided, vec![0.0], vec![0.0])],
-            dynamics: Sections::from_state_space(&lag.to_state_space().unwrap(), 0).unwrap(),
-            intersample: Intersample::default(),
-            effects: Vec::new(),
-            rate: 1.0,
-            offsets: vec![Matrix::zeros(1, 1)],
+        let point = |state: f64| {
+            let mut lag = plain(&[0.0, 0.3], &[1.0, -0.7], Vec::new());
+            lag.pasts[0].has_unknown_state = true;
+            lag.pasts[0].state.fill(state);
+            lag
         };
         let u = Matrix::from_fn(200, 1, |k, _| (0.2 * k as f64).sin());
         let begins = |state: f64| {
             let channel = |name| vec![Channel::new(name, "")];
             let zeros = Experiment::new(u.clone(), Matrix::zeros(200, 1));
-            let of = |runs| Record::new(runs, 1.0, channel("u"), channel("y"), vec![]).unwrap();
+            let of = |runs| Record::new(runs, 1e3, channel("u"), channel("y"), vec![]).unwrap();
             // minus what the model makes of the input
             let residual = point(state).residuals(&of(vec![zeros])).unwrap().remove(0);
             of(vec![Experiment::new(u.clone(), -residual)])

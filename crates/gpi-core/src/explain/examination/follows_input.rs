@@ -94,12 +94,9 @@ fn chance(one: &DVector<f64>, other: &DVector<f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::hysteresis::Parameters;
-    use crate::chain::point::Past;
-    use crate::effects::{Effect, GainDrift};
-    use crate::linear::{Sections, TransferFunction};
-    use crate::operators::Reading;
-    use crate::{Channel, Experiment, Intersample, Matrix};
+    use crate::chain::plain::plain;
+    use crate::effects::GainDrift;
+    use crate::{Channel, Experiment, Matrix};
 
     #[test]
     fn chance_is_that_of_the_table() {
@@ -127,16 +124,8 @@ mod tests {
         let record = Record::new(vec![run], rate, channels.0, channels.1, vec![]).unwrap();
         let changes = (1..=amplitudes.len()).map(curve).collect();
         let duration = record.longest() as f64 / rate;
-        let gain = TransferFunction::new(&[1.0], &[1.0]).unwrap().to_state_space().unwrap();
-        let point = Point {
-            pasts: vec![Past { plays: None, has_unknown_state: false, state: DVector::zeros(0) }],
-            channels: vec![Parameters::identity(Reading::OneSided, vec![0.0], vec![0.0])],
-            dynamics: Sections::from_state_space(&gain, 0).unwrap(),
-            intersample: Intersample::default(),
-            effects: vec![Effect::from(GainDrift { output: 0, changes, duration })],
-            rate,
-            offsets: vec![Matrix::zeros(1, 1)],
-        };
+        let gain = GainDrift { output: 0, changes, duration };
+        let point = plain(&[1.0], &[1.0], vec![gain.into()]);
         follows_input(&record, &point, 0, &ExaminationPolicy::default())
     }
 

@@ -118,46 +118,30 @@ impl Piece {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::hysteresis::Parameters;
-    use crate::chain::point::Past;
-    use crate::effects::{Drift, Effect};
-    use crate::linear::{Sections, TransferFunction};
-    use crate::operators::Reading;
-    use crate::{Channel, Experiment, Intersample, Matrix};
-    use nalgebra::DVector;
+    use crate::chain::plain::plain;
+    use crate::effects::Drift;
+    use crate::explain::outside::plants::noise;
+    use crate::{Channel, Experiment, Matrix};
 
     /// Whether a drift of 16 knots, each at the value of `disturbance` there, is refused.
     fn is_refused(disturbance: impl Fn(usize) -> f64) -> bool {
-        let samples = 801;
+        let (samples, rate) = (801, 1e3);
         let u = Matrix::from_fn(samples, 1, |k, _| (0.3 * k as f64).sin());
-        let mut seed = 1_u64;
-        let y = Matrix::from_fn(samples, 1, |k, _| {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            u[k] + disturbance(k) + 0.01 * ((seed >> 33) as f64 / f64::from(1_u32 << 30) - 1.0)
-        });
+        let mut noise = noise(1);
+        let y = Matrix::from_fn(samples, 1, |k, _| u[k] + disturbance(k) + 0.01 * noise());
         let knot = |j: usize| disturbance(50 * j) - disturbance(0);
         let drift = Drift {
             output: 0,
             moves_stage: false,
             changes: (1..=16).map(knot).collect(),
-            duration: samples as f64,
+            duration: samples as f64 / rate,
             span: 2.0,
         };
-        let gain = TransferFunction::new(&[1.0], &[1.0]).unwrap().to_state_space().unwrap();
-        let point = Point {
-            pasts: vec![Past { plays: None, has_unknown_state: false, state: DVector::zeros(0) }],
-            channels: vec![Parameters::identity(Reading::OneSided, vec![0.0], vec![0.0])],
-            dynamics: Sections::from_state_space(&gain, 0).unwrap(),
-            intersample: Intersample::default(),
-            effects: vec![Effect::from(drift)],
-            rate: 1.0,
-            offsets: vec![Matrix::from_element(1, 1, disturbance(0))],
-        };
+        let mut point = plain(&[1.0], &[1.0], vec![drift.into()]);
+        point.offsets[0].fill(disturbance(0));
         let channel = |name| vec![Channel::new(name, "")];
         let record =
-            Record::new(vec![Experiment::new(u, y)], 1.0, channel("u"), channel("y"), vec![]);
+            Record::new(vec![Experiment::new(u, y)], rate, channel("u"), channel("y"), vec![]);
         is_of_jumps(&record.unwrap(), &point, 0, 0.5).unwrap()
     }
 

@@ -237,28 +237,14 @@ fn lacks_spring(point: &Point, inner: &InnerLoop, most: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::hysteresis::Parameters;
-    use crate::chain::point::Past;
+    use crate::chain::plain::plain;
     use crate::effects::{Drives, Law, Sees, Stiffness};
-    use crate::linear::{Sections, TransferFunction};
-    use crate::operators::Reading;
-    use crate::{Intersample, Matrix};
-    use nalgebra::DVector;
 
     /// A resonance of compliance 2, and a force of so much for each unit of the law that acts against the input.
     fn point(law: Law, force: f64) -> Point {
-        let resonance = TransferFunction::new(&[0.3, 0.1], &[1.0, -1.6, 0.8]).unwrap();
         let drives = Drives::Input { input: 0, force, states: 2 };
         let loops = vec![InnerLoop { sees: Sees::Output(0), law, drives }];
-        Point {
-            pasts: vec![Past { plays: None, has_unknown_state: false, state: DVector::zeros(2) }],
-            channels: vec![Parameters::identity(Reading::OneSided, vec![0.0], vec![0.0])],
-            dynamics: Sections::from_state_space(&resonance.to_state_space().unwrap(), 0).unwrap(),
-            intersample: Intersample::default(),
-            effects: vec![Effect::from(Stiffness { loops })],
-            rate: 1e3,
-            offsets: vec![Matrix::zeros(1, 1)],
-        }
+        plain(&[0.3, 0.1], &[1.0, -1.6, 0.8], vec![Stiffness { loops }.into()])
     }
 
     #[test]

@@ -8,7 +8,7 @@ mod butterfly;
 mod feedback;
 mod integration;
 #[cfg(test)]
-mod plants;
+pub(super) mod plants;
 mod saturation;
 mod signs;
 mod winner;

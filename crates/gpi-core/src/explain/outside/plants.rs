@@ -1,10 +1,10 @@
-//! Signals for the tests of this folder.
+//! Signals for the tests of the search.
 
 use crate::rivals::Units;
 use crate::{Channel, Experiment, Matrix, Record};
 
 /// Numbers between -1 and 1 that look random.
-pub(super) fn noise(seed: u64) -> impl FnMut() -> f64 {
+pub(in crate::explain) fn noise(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     move || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);

@@ -1,0 +1,25 @@
+//! A point without hysteresis, for tests.
+
+use super::hysteresis::Parameters;
+use super::point::{Past, Point};
+use crate::effects::Effect;
+use crate::linear::{Sections, TransferFunction};
+use crate::operators::Reading;
+use crate::{Intersample, Matrix};
+use nalgebra::DVector;
+
+/// A transfer function of one input and one output, at rest before one experiment sampled at 1 kHz.
+pub(crate) fn plain(numerator: &[f64], denominator: &[f64], effects: Vec<Effect>) -> Point {
+    let system = TransferFunction::new(numerator, denominator).unwrap().to_state_space().unwrap();
+    let dynamics = Sections::from_state_space(&system, 0).unwrap();
+    let state = DVector::zeros(dynamics.order());
+    Point {
+        pasts: vec![Past { plays: None, has_unknown_state: false, state }],
+        channels: vec![Parameters::identity(Reading::OneSided, vec![0.0], vec![0.0])],
+        dynamics,
+        intersample: Intersample::default(),
+        effects,
+        rate: 1e3,
+        offsets: vec![Matrix::zeros(1, 1)],
+    }
+}
