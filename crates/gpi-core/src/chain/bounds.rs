@@ -163,6 +163,7 @@ impl Point {
                 };
                 values.iter().enumerate().map(side).collect()
             }
+            Group::Gaps { .. } => values.iter().map(|side| (-1.0 - side, 1.0 - side)).collect(),
             // a pole that integrates stands at the unit circle; others are kept inside by their step
             Group::Denominator { section }
                 if values.len() == 1 && self.dynamics.sections[section].growth > 1.0 =>
@@ -262,7 +263,6 @@ mod tests {
     use crate::linear::Sections;
     use crate::operators::Reading;
     use crate::{Channel, Experiment, Matrix};
-    use nalgebra::DVector;
 
     /// A drive between -1 and 1 with one visit of 1.5, and an output of twice its size.
     fn record() -> Record {
@@ -288,7 +288,7 @@ mod tests {
     fn point(thresholds: Vec<f64>, half_widths: Vec<f64>) -> Point {
         let channel = Parameters::identity(Reading::OneSided, thresholds, half_widths);
         Point {
-            pasts: vec![Past { plays: None, has_unknown_state: false, state: DVector::zeros(0) }],
+            pasts: vec![Past::rest(0, 1)],
             channels: vec![channel],
             dynamics: Sections::delayed_gain(&Matrix::from_element(1, 1, 1.0), 0),
             intersample: Intersample::default(),

@@ -54,8 +54,8 @@ impl Point {
         point.gain_from(effect.stage(), (known, here), experiment, index)
     }
 
-    /// Derivatives of the output by the values of every effect whose own do not stream along: `[effect][value]`,
-    /// (samples, outputs), from differences.
+    /// Derivatives of the output by the values of every effect whose own do not stream along, `[effect][value]`, and at last by the places
+    /// of the readings in their gaps: each (samples, outputs), from differences.
     pub(crate) fn effect_columns(
         &self,
         experiment: &Experiment,
@@ -67,7 +67,7 @@ impl Point {
         let runs = |effect: &Effect| !streams(effect) && self.apart(effect).is_none();
         let (known, here) = if self.effects.iter().any(runs) {
             let known = self.signals(experiment, index)?;
-            let here = self.output(&known);
+            let here = self.output(&known, index);
             (known, here)
         } else {
             // an added signal has derivatives of its own alone
@@ -80,7 +80,34 @@ impl Point {
             }
             self.columns_of(place, &known, &here, experiment, index)
         };
-        install(|| self.effects.par_iter().enumerate().map(of).collect())
+        let of_effects = || self.effects.par_iter().enumerate().map(of);
+        let mut columns: Vec<Vec<Matrix>> = install(|| of_effects().collect::<Result<_, _>>())?;
+        columns.push(self.gap_columns(&known, &here, experiment, index)?);
+        Ok(columns)
+    }
+
+    /// Derivatives of the output by the place s of each reading in its gap, where that is unknown. Until the gap first closes, the reading
+    /// is `x(0) + s b`, so that the difference is exact.
+    fn gap_columns(
+        &self,
+        known: &Signals,
+        here: &Matrix,
+        experiment: &Experiment,
+        index: usize,
+    ) -> Result<Vec<Matrix>, Error> {
+        /// A part of the half-width, far above the rounding of x.
+        const STEP: f64 = 1e-4;
+        let column = |output: usize| {
+            let mut moved = self.clone();
+            let side = &mut moved.pasts[index].gaps[output];
+            let step = if *side > 0.0 { -STEP } else { STEP };
+            *side += step;
+            Ok(moved.gain_from(Stage::Output, (known, here), experiment, index)? / step)
+        };
+        if !self.pasts[index].has_unknown_state {
+            return Ok(Vec::new());
+        }
+        self.gapped().into_iter().map(column).collect()
     }
 
     /// The same of one effect whose derivatives do not stream along, or of a curve that is a candidate; `here` is the output. Where the

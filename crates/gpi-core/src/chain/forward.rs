@@ -164,7 +164,7 @@ impl<'a> Forward<'a> {
             if k == 0 {
                 let stages = displaced.iter().enumerate();
                 self.sensing = stages
-                    .map(|(output, &first)| Sensing::new(self.point, output, first))
+                    .map(|(output, &first)| Sensing::new(self.point, self.index, output, first))
                     .collect();
             }
             let own = scored.next_if(|(_, scored)| **scored == place);

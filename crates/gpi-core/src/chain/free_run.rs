@@ -145,16 +145,22 @@ impl Point {
     }
 
     /// The output (samples, outputs) without its offsets, of a displacement and of what is added before and after the output stage.
-    fn reading(&self, mut displacement: Matrix, [before, after]: &[Matrix; 2]) -> Matrix {
+    fn reading(
+        &self,
+        mut displacement: Matrix,
+        [before, after]: &[Matrix; 2],
+        index: usize,
+    ) -> Matrix {
         let stages = self.stages();
         displacement += before;
-        stages.sense(&mut stages.memories(), &mut displacement);
+        let side = |output: usize| self.pasts[index].side(output);
+        stages.sense(&mut stages.memories(), &side, &mut displacement);
         displacement + after
     }
 
-    /// The output (samples, outputs) without its offsets.
-    pub(crate) fn output(&self, signals: &Signals) -> Matrix {
-        self.reading(signals.displacement.clone(), &signals.added)
+    /// The output (samples, outputs) of an experiment without its offsets.
+    pub(crate) fn output(&self, signals: &Signals, index: usize) -> Matrix {
+        self.reading(signals.displacement.clone(), &signals.added, index)
     }
 
     /// The output (samples, outputs) without its offsets, from the stage on at which `known` ends.
@@ -167,9 +173,9 @@ impl Point {
     ) -> Result<Matrix, Error> {
         let displacement = self.displacement_from(stage, known, experiment, index)?;
         if matches!(stage, Stage::Displaced | Stage::Added) {
-            return Ok(self.reading(displacement, &self.added(experiment)));
+            return Ok(self.reading(displacement, &self.added(experiment), index));
         }
-        Ok(self.reading(displacement, &known.added))
+        Ok(self.reading(displacement, &known.added, index))
     }
 
     /// The displacement (samples, outputs), from the stage on at which `known` ends.
@@ -211,7 +217,7 @@ impl Point {
         let residual = |(index, (experiment, offsets)): (usize, (&Experiment, &Matrix))| {
             let samples = experiment.input.nrows();
             let known = self.signals(experiment, index)?;
-            let mut residual = &experiment.output - self.output(&known);
+            let mut residual = &experiment.output - self.output(&known, index);
             for k in 0..samples {
                 for (knot, weight) in hats(k, samples, offsets.nrows()) {
                     let mut row = residual.row_mut(k);

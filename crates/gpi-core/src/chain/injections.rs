@@ -201,7 +201,10 @@ impl Entries<'_> {
                 self.add(unknowns.start, self.places.y.start + output, self.v(input), 1.0);
             }
             Group::Effect { place } => self.effect(place, unknowns),
-            Group::Plays { .. } | Group::Offsets { .. } | Group::State { .. } => {}
+            Group::Plays { .. }
+            | Group::Gaps { .. }
+            | Group::Offsets { .. }
+            | Group::State { .. } => {}
         }
     }
 

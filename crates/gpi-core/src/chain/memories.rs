@@ -62,7 +62,7 @@ fn remembered(effect: &Effect, rate: f64) -> (usize, bool) {
             (own.dead_time() + states, false)
         }
         Place::Loops(own) => (own.loops().iter().map(|inner| inner.law.memories()).sum(), true),
-        Place::Output(own) => (own.rest(0.0).len(), true),
+        Place::Output(own) => (own.rest(0.0, None).len(), true),
         Place::Added(own) => (own.rest(first).len(), true),
         Place::Curves(_) | Place::Finding(_) => (0, true),
     }

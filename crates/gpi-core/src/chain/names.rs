@@ -54,6 +54,7 @@ fn described(group: Group, place: usize, point: &Point, record: &Record) -> (Str
         | Group::Observer { .. }
         | Group::Effect { .. }
         | Group::Plays { .. }
+        | Group::Gaps { .. }
         | Group::State { .. } => (String::new(), false),
     }
 }
@@ -106,6 +107,9 @@ fn name(group: Group, place: usize, point: &Point, record: &Record) -> String {
             knots => format!("offset[{experiment}].{}[{}]", y(place / knots), place % knots),
         },
         Group::Plays { experiment, input } => format!("start[{experiment}].{}[{place}]", u(input)),
+        Group::Gaps { experiment } => {
+            format!("start[{experiment}].gap[{}]", y(point.gapped()[place]))
+        }
         Group::State { experiment } => format!("start[{experiment}].state[{place}]"),
     }
 }

@@ -6,15 +6,13 @@ use crate::effects::Effect;
 use crate::linear::{Sections, TransferFunction};
 use crate::operators::Reading;
 use crate::{Intersample, Matrix};
-use nalgebra::DVector;
 
 /// A transfer function of one input and one output, at rest before one experiment sampled at 1 kHz.
 pub(crate) fn plain(numerator: &[f64], denominator: &[f64], effects: Vec<Effect>) -> Point {
     let system = TransferFunction::new(numerator, denominator).unwrap().to_state_space().unwrap();
     let dynamics = Sections::from_state_space(&system, 0).unwrap();
-    let state = DVector::zeros(dynamics.order());
     Point {
-        pasts: vec![Past { plays: None, has_unknown_state: false, state }],
+        pasts: vec![Past::rest(dynamics.order(), 1)],
         channels: vec![Parameters::identity(Reading::OneSided, vec![0.0], vec![0.0])],
         dynamics,
         intersample: Intersample::default(),

@@ -30,11 +30,31 @@ pub(crate) struct Past {
     /// The initial places of the plays, as fractions of their half-widths from z (-1 to 1), `[input][play]`; `None` when
     /// the actuator came from rest.
     pub plays: Option<Vec<Vec<f64>>>,
-    /// Whether the initial state is unknown, so that `state` is to be fitted.
+    /// Where each output's reading stands in its gap, if it has one, as a fraction of the half-width from the displacement (-1 to 1);
+    /// used where the initial state is unknown.
+    pub gaps: DVector<f64>,
+    /// Whether the initial state is unknown, so that `gaps` and `state` are to be fitted.
     pub has_unknown_state: bool,
     /// By how much the state of all [`Point::sections`] at the first scored sample differs from the steady
     /// state before the record.
     pub state: DVector<f64>,
+}
+
+impl Past {
+    /// At rest, before so many states and outputs.
+    pub(crate) fn rest(states: usize, outputs: usize) -> Self {
+        Self {
+            plays: None,
+            gaps: DVector::zeros(outputs),
+            has_unknown_state: false,
+            state: DVector::zeros(states),
+        }
+    }
+
+    /// Where the reading of an output stands in its gap, if that is unknown.
+    pub(crate) fn side(&self, output: usize) -> Option<f64> {
+        self.has_unknown_state.then(|| self.gaps[output])
+    }
 }
 
 /// All parameters of a model and of its experiments.
@@ -91,6 +111,15 @@ impl Point {
             own.sections(self.rate).into_iter().map(one)
         });
         self.dynamics.sections.iter().cloned().chain(parallel).collect()
+    }
+
+    /// The outputs whose reading a gap may hold.
+    pub(crate) fn gapped(&self) -> Vec<usize> {
+        let own = self.output_stages().filter(|own| !own.rest(0.0, None).is_empty());
+        let mut outputs: Vec<usize> = own.map(OutputStage::output).collect();
+        outputs.sort_unstable();
+        outputs.dedup();
+        outputs
     }
 
     /// The states of all sections.

@@ -1,4 +1,5 @@
-//! What is known of a hysteresis without the data: the density of its plays is smooth, and its envelope bends little.
+//! What is known without the data: the density of the plays is smooth, the envelope bends little, and initial states are not far larger
+//! than the output.
 //!
 //! A record seldom tells neighbouring plays of a fine grid apart, nor one deadzone from the next. With weights p_i on half-widths at equal
 //! distances and slopes g_j of the deadzones but the first, the prior adds to the cost
@@ -10,6 +11,16 @@
 //! This is (T14) in the documentation's theory. A fit with it is the maximum of the posterior density for independent normal second
 //! differences of p and slopes g. Both terms are quadratic in the unknowns, so that they add a constant matrix to the Gram matrix.
 //!
+//! Behind an output stage, the samples at the begin of an experiment may say next to nothing of its initial state x: the gap of a backlash is
+//! open, or a sensor is at the end of its range. The rest of the experiment then asks for an arbitrary x. With an output stage,
+//!
+//! ```text
+//! f |x|^2,      f = 1e-6
+//! ```
+//!
+//! is added to the cost. The sections are in observer form, so that a state is about as large as what it adds to the output: x counts as if
+//! one sample had shown a thousandth of it, and a state that any sample shows is not changed.
+//!
 //! Source: G. Pillonetto, F. Dinuzzo, T. Chen, G. De Nicolao, L. Ljung, *Kernel methods in system identification, machine learning and function
 //! estimation: a survey*, Automatica 50, 2014.
 
@@ -19,6 +30,9 @@ use super::table::{Group, Table};
 use crate::Matrix;
 use crate::linear::Arrow;
 use nalgebra::DVector;
+
+/// f of the initial states behind an output stage.
+const STATES: f64 = 1e-6;
 
 /// A part of the prior: the places of its unknowns, its matrix K and its factor, which add `factor x' K x`.
 pub(crate) struct PriorPart {
@@ -74,22 +88,38 @@ impl Point {
         self.channels.iter().any(|channel| !channel.prior.is_none())
     }
 
+    /// The unknown initial states of each experiment, where an output stage may hide them.
+    fn hidden_states(&self, table: &Table) -> Vec<Vec<usize>> {
+        if !self.senses() {
+            return Vec::new();
+        }
+        let of = |experiment| table.range(Group::State { experiment }).collect();
+        (0..self.pasts.len()).map(of).collect()
+    }
+
     /// What the prior adds to the cost.
     pub(crate) fn penalty(&self, table: &Table) -> f64 {
-        if !self.has_prior() {
+        if !self.has_prior() && !self.senses() {
             return 0.0;
         }
         let values = table.values(self);
-        self.prior(table).iter().map(|part| part.factor * part.square(&values)).sum()
+        let hidden = self.hidden_states(table).into_iter().flatten();
+        let states: f64 = hidden.map(|place| STATES * values[place].powi(2)).sum();
+        let parts = self.prior(table);
+        states + parts.iter().map(|part| part.factor * part.square(&values)).sum::<f64>()
     }
 
     /// Adds the prior to the descent of the cost; returns what it adds to the cost.
     pub(crate) fn penalise(&self, table: &Table, descent: &mut DVector<f64>) -> f64 {
-        if !self.has_prior() {
+        if !self.has_prior() && !self.senses() {
             return 0.0;
         }
         let values = table.values(self);
         let mut penalty = 0.0;
+        for place in self.hidden_states(table).into_iter().flatten() {
+            descent[place] -= STATES * values[place];
+            penalty += STATES * values[place].powi(2);
+        }
         for part in self.prior(table) {
             let product = &part.matrix * part.own(&values);
             for (&place, value) in part.places.iter().zip(product.iter()) {
@@ -98,6 +128,14 @@ impl Point {
             penalty += part.factor * part.square(&values);
         }
         penalty
+    }
+
+    /// Adds the prior to a Gram matrix.
+    pub(crate) fn curve(&self, table: &Table, gram: &mut Arrow) {
+        add_prior(&self.prior(table), gram);
+        for states in self.hidden_states(table) {
+            gram.add_part(&(STATES * Matrix::identity(states.len(), states.len())), &states);
+        }
     }
 }
 
@@ -121,6 +159,42 @@ fn second_differences(count: usize) -> Matrix {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::plain::plain;
+    use crate::chain::point::{DynamicsFreedom, Freedom};
+    use crate::chain::sensitivity::Derivatives;
+    use crate::effects::Backlash;
+
+    #[test]
+    fn initial_states_behind_a_gap_are_damped_and_cost_a_little() {
+        let gap = Backlash { output: 0, half_width: 0.3, missing: None };
+        for (effects, own) in [(vec![gap.into()], STATES), (vec![], 0.0)] {
+            let is_hidden = own > 0.0;
+            let mut point = plain(&[0.0, 0.3], &[1.0, -0.7], effects);
+            point.pasts[0].has_unknown_state = true;
+            point.pasts[0].state[0] = 2.0;
+            let freedom = Freedom {
+                weights: true,
+                offsets: true,
+                derivatives: Derivatives::default(),
+                states: true,
+                identity: true,
+                dynamics: DynamicsFreedom::Everything,
+            };
+            let table = Table::new(&point, freedom);
+            let state = table.range(Group::State { experiment: 0 }).start;
+            assert_eq!(table.is_linear(state), !is_hidden);
+            let mut gram = Arrow::zeros(table.len, table.own());
+            point.curve(&table, &mut gram);
+            let mut descent = DVector::zeros(table.len);
+            assert_eq!(point.penalise(&table, &mut descent), 4.0 * own);
+            assert_eq!(point.penalty(&table), 4.0 * own);
+            assert_eq!((gram.get(state, state), descent[state]), (own, -2.0 * own));
+            assert_eq!(
+                descent.iter().filter(|value| **value != 0.0).count(),
+                usize::from(is_hidden)
+            );
+        }
+    }
 
     #[test]
     fn straight_weights_cost_nothing() {

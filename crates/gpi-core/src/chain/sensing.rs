@@ -12,7 +12,7 @@
 //!
 //! dy before the first sample is zero: the place of a backlash at rest is taken as independent of the unknowns. That is
 //! exact where the first displacement lies within the gap around zero, and elsewhere an error until the gap first
-//! closes.
+//! closes. A backlash that begins in motion stands at `x(0) + s b`, so that dy(0) = dx(0) however the gap stands.
 
 use super::lanes::Lanes;
 use super::point::Point;
@@ -21,27 +21,32 @@ use crate::effects::{Moment, OutputStage, Slope};
 /// The effects of the output stage on one output, with what they remember.
 pub(crate) struct Sensing<'a> {
     blocks: Vec<(&'a dyn OutputStage, Vec<f64>)>,
+    /// Whether the next sample is the first one of an experiment that begins in motion.
+    begins: bool,
 }
 
 impl<'a> Sensing<'a> {
-    /// The displacement was constant at `first`.
-    pub(crate) fn new(point: &'a Point, output: usize, first: f64) -> Self {
+    /// In an experiment of which the displacement `first` is the first one.
+    pub(crate) fn new(point: &'a Point, experiment: usize, output: usize, first: f64) -> Self {
+        let side = point.pasts[experiment].side(output);
         let own = point.output_stages().filter(|effect| effect.output() == output);
         let mut value = first;
         let blocks = own.map(|effect| {
             let moment = point.stages().moment(0, &[]);
-            let state = effect.rest(value);
+            let state = effect.rest(value, side);
             value = effect.sense(&mut state.clone(), value, moment).0;
             (effect, state)
         });
-        Self { blocks: blocks.collect() }
+        Self { blocks: blocks.collect(), begins: side.is_some() }
     }
 
     /// Takes one sample through; appends how changes pass each effect.
     pub(crate) fn step(&mut self, output: f64, moment: Moment, slopes: &mut Vec<Slope>) -> f64 {
+        let begins = std::mem::take(&mut self.begins);
         self.blocks.iter_mut().fold(output, |value, (effect, state)| {
             let (sensed, slope) = effect.sense(state, value, moment);
-            slopes.push(slope);
+            let moves_along = begins && slope == Slope::Held;
+            slopes.push(if moves_along { Slope::Times(1.0) } else { slope });
             sensed
         })
     }
@@ -67,5 +72,69 @@ impl Slope {
             Self::Times(factor) => (factor * all, 0.0),
             Self::Held => (0.0, all),
         };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::chain::plain::plain;
+    use crate::chain::point::{DynamicsFreedom, Freedom};
+    use crate::chain::sensitivity::Derivatives;
+    use crate::chain::stream::Stream;
+    use crate::chain::table::{Group, Table};
+    use crate::effects::Backlash;
+    use crate::{Channel, Experiment, Matrix, Record};
+    use nalgebra::DVector;
+
+    #[test]
+    fn derivatives_of_a_gap_that_begins_in_motion_are_those_of_differences() {
+        let gap = Backlash { output: 0, half_width: 0.3, missing: None };
+        let mut point = plain(&[0.0, 0.3], &[1.0, -0.7], vec![gap.into()]);
+        point.pasts[0].has_unknown_state = true;
+        point.pasts[0].gaps[0] = 0.4;
+        let u = Matrix::from_fn(150, 1, |k, _| 1.5 + (0.05 * k as f64).sin());
+        let run = Experiment::new(u.clone(), u);
+        let channel = |name| vec![Channel::new(name, "")];
+        let record = Record::new(vec![run], 1e3, channel("u"), channel("y"), vec![]).unwrap();
+        let freedom = Freedom {
+            weights: true,
+            offsets: true,
+            derivatives: Derivatives::default(),
+            states: true,
+            identity: true,
+            dynamics: DynamicsFreedom::Everything,
+        };
+        let table = Table::new(&point, freedom);
+        let side = table.range(Group::Gaps { experiment: 0 });
+        assert_eq!(table.names(&point, &record)[side.clone()], ["start[0].gap[y]"]);
+        let experiment = &record.experiments()[0];
+        let stream = Stream::new(&point, &table, freedom.derivatives, experiment, 0);
+        let mut columns = Matrix::zeros(table.len, 150);
+        let mut first = 0;
+        let mut take = |rows: crate::chain::stream::Rows| {
+            let count = rows.residuals.ncols();
+            columns.columns_mut(first, count).copy_from(&rows.regressors[0]);
+            first += count;
+            Ok(())
+        };
+        stream.unwrap().run(&mut take).unwrap();
+        // the place in the gap matters until the gap first closes
+        let held = columns.row(side.start).iter().take_while(|&&change| change > 0.2999).count();
+        assert!((5..140).contains(&held) && columns[(side.start, 149)] == 0.0, "{held}");
+        let step = 1e-6;
+        for unknown in 0..table.len {
+            let at = |step: f64| {
+                let mut all = DVector::zeros(table.len);
+                all[unknown] = step;
+                point.moved(&all, &table).residuals(&record).unwrap().remove(0)
+            };
+            let expected = (at(-step) - at(step)) / (2.0 * step);
+            // weights cannot become negative, and a bound weight has a derivative to one side only
+            let largest = expected.amax().max(1.0);
+            for k in 0..150 {
+                let error = columns[(unknown, k)] - expected[k];
+                assert!(error.abs() < 1e-4 * largest, "{unknown} {k}: {error} of {largest}");
+            }
+        }
     }
 }

@@ -72,15 +72,21 @@ impl<'a> Stages<'a> {
     /// and what is added after it. `covariates` are (samples, columns).
     pub(crate) fn read(&self, memories: &mut [Vec<f64>], covariates: &Matrix, signal: &mut Matrix) {
         self.add(memories, true, covariates, signal);
-        self.sense(memories, signal);
+        self.sense(memories, &|_| None, signal);
         self.add(memories, false, covariates, signal);
     }
 
-    pub(crate) fn sense(&self, memories: &mut [Vec<f64>], signal: &mut Matrix) {
+    /// The output stage. `side` tells where the gap of an output stands at first ([`crate::effects::OutputStage::rest`]).
+    pub(crate) fn sense(
+        &self,
+        memories: &mut [Vec<f64>],
+        side: &dyn Fn(usize) -> Option<f64>,
+        signal: &mut Matrix,
+    ) {
         for (effect, memory) in self.at(memories, Place::output_stage) {
             let mut column = signal.column_mut(effect.output());
             if memory.is_empty() {
-                *memory = effect.rest(column[0]);
+                *memory = effect.rest(column[0], side(effect.output()));
             }
             for (k, value) in column.iter_mut().enumerate() {
                 *value = effect.sense(memory, *value, self.moment(k, &[])).0;

@@ -44,9 +44,9 @@ struct Behind<'a> {
     index: usize,
     tangents: Tangents<'a>,
     unknowns: usize,
-    /// Derivatives by the values of effects, `[effect][value]`.
+    /// Derivatives by the values of effects, `[effect][value]`, then by the places in the gaps.
     effects: Vec<Vec<Matrix>>,
-    /// Where the unknowns of the offsets and of each effect stand.
+    /// Where the unknowns of the offsets stand, and those of each effect and of the gaps.
     offset_unknowns: usize,
     effect_unknowns: Vec<Range<usize>>,
     /// The sample from which on derivatives are taken along.
@@ -68,7 +68,9 @@ impl<'a> Stream<'a> {
             effects: point.effect_columns(experiment, index)?,
             offset_unknowns: table.range(Group::Offsets { experiment: index }).start,
             effect_unknowns: (0..point.effects.len())
-                .map(|place| table.range(Group::Effect { place }))
+                .map(|place| Group::Effect { place })
+                .chain([Group::Gaps { experiment: index }])
+                .map(|group| table.range(group))
                 .collect(),
             tangents_from: 0,
             point,

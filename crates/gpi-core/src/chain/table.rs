@@ -7,7 +7,7 @@
 //!
 //! The unknown vector theta is the concatenation of the free groups in the order of `groups`: weights, slopes,
 //! thresholds and half-widths of all inputs; a, b, c of the sections of G; a, b of parallel sections; free elements of
-//! D; values of effects; offsets; starts of the plays; initial states. A held group has no row. A held value of a free
+//! D; values of effects; offsets; starts of the plays and of gaps; initial states. A held group has no row. A held value of a free
 //! group keeps its place in theta and is held by the bounds.
 //!
 //! A step s (unknowns) from a point theta is not always theta + s. With P the projection that `Group::add` and
@@ -84,6 +84,10 @@ pub(crate) enum Group {
         experiment: usize,
         input: usize,
     },
+    /// Where the readings of [`Point::gapped`] stand at first in an experiment.
+    Gaps {
+        experiment: usize,
+    },
     /// The initial state of the sections in an experiment.
     State {
         experiment: usize,
@@ -91,7 +95,7 @@ pub(crate) enum Group {
 }
 
 use Group::{
-    Denominator, Effect, Feedthrough, HalfWidths, Numerator, Observer, Offsets,
+    Denominator, Effect, Feedthrough, Gaps, HalfWidths, Numerator, Observer, Offsets,
     ParallelDenominator, ParallelNumerator, Plays, Slopes, State, Thresholds, Weights,
 };
 
@@ -101,6 +105,8 @@ pub(crate) struct Table {
     rows: Vec<(Group, Range<usize>)>,
     /// Whether loops are closed around G.
     has_loops: bool,
+    /// Whether a gap may hold a reading.
+    has_gaps: bool,
     /// Unknowns that are the coefficients of z^1 and z^0 of a polynomial of a section.
     pairs: Vec<[usize; 2]>,
     /// How many unknowns there are.
@@ -120,7 +126,8 @@ impl Table {
         let rows: Vec<_> = free.map(row).collect();
         let pairs =
             rows.iter().flat_map(|(group, range)| group.pairs(point, range.start)).collect();
-        Self { rows, has_loops: point.loops().next().is_some(), pairs, len }
+        let (has_loops, has_gaps) = (point.loops().next().is_some(), !point.gapped().is_empty());
+        Self { rows, has_loops, has_gaps, pairs, len }
     }
 
     /// All rows in the order of the unknowns.
@@ -142,7 +149,9 @@ impl Table {
             rows.push((*group, places.len()..places.len() + range.len()));
             places.extend(range.clone());
         }
-        (Self { rows, has_loops: self.has_loops, pairs: Vec::new(), len: places.len() }, places)
+        let len = places.len();
+        let Self { has_loops, has_gaps, .. } = *self;
+        (Self { rows, has_loops, has_gaps, pairs: Vec::new(), len }, places)
     }
 
     /// The unknowns of each experiment that move no other one's output. The only experiment has none: nothing else
@@ -165,11 +174,13 @@ impl Table {
     }
 
     /// Whether the output is linear in an unknown while all others are kept. That is exact without an output stage, and otherwise
-    /// what the solver assumes when it leaves these unknowns undamped. v goes around loops, and so do the states.
+    /// what the solver assumes when it leaves these unknowns undamped. v goes around loops, and so do the states. A gap hides an initial
+    /// state that is small, and does not hide a larger one.
     pub(crate) fn is_linear(&self, unknown: usize) -> bool {
         match self.at(unknown) {
             Some((Offsets { .. }, _)) => true,
-            Some((Weights { .. } | State { .. }, _)) => !self.has_loops,
+            Some((Weights { .. }, _)) => !self.has_loops,
+            Some((State { .. }, _)) => !self.has_loops && !self.has_gaps,
             _ => false,
         }
     }
@@ -211,6 +222,7 @@ fn groups(point: &Point) -> Vec<Group> {
     for experiment in experiments.clone() {
         all.extend(inputs.clone().map(|input| Plays { experiment, input }));
     }
+    all.extend(experiments.clone().map(|experiment| Gaps { experiment }));
     all.extend(experiments.map(|experiment| State { experiment }));
     all
 }
@@ -255,6 +267,10 @@ impl Group {
             Plays { experiment, .. } => {
                 derivatives.starts && point.pasts[experiment].plays.is_some()
             }
+            Gaps { experiment } => {
+                let is_free = freedom.states && point.pasts[experiment].has_unknown_state;
+                is_free && !point.gapped().is_empty()
+            }
             State { experiment } => freedom.states && point.pasts[experiment].has_unknown_state,
         }
     }
@@ -294,9 +310,10 @@ impl Group {
     /// The experiment whose output alone the group moves.
     fn experiment(self) -> Option<usize> {
         match self {
-            Offsets { experiment } | Plays { experiment, .. } | State { experiment } => {
-                Some(experiment)
-            }
+            Offsets { experiment }
+            | Plays { experiment, .. }
+            | Gaps { experiment }
+            | State { experiment } => Some(experiment),
             _ => None,
         }
     }
@@ -324,6 +341,10 @@ impl Group {
             Plays { experiment, input } => {
                 let plays = point.pasts[experiment].plays.as_ref();
                 plays.map_or_else(Vec::new, |plays| plays[input].clone())
+            }
+            Gaps { experiment } => {
+                let gaps = &point.pasts[experiment].gaps;
+                point.gapped().into_iter().map(|output| gaps[output]).collect()
             }
             State { experiment } => point.pasts[experiment].state.as_slice().to_vec(),
         }
@@ -365,6 +386,11 @@ impl Group {
             Plays { experiment, input } => {
                 let plays = point.pasts[experiment].plays.as_mut();
                 plays.into_iter().for_each(|plays| add(&mut plays[input]));
+            }
+            Gaps { experiment } => {
+                for (output, change) in point.gapped().into_iter().zip(change) {
+                    point.pasts[experiment].gaps[output] += change;
+                }
             }
             State { experiment } => add(point.pasts[experiment].state.as_mut_slice()),
         }

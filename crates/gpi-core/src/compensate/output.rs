@@ -55,7 +55,7 @@ fn undo(effect: &dyn OutputStage, signal: &mut [f64], rate: f64) {
         let [lowest, highest] = effect.range();
         let wanted = value.max(lowest).min(highest);
         let show = |x: f64| {
-            let mut own = memory.clone().unwrap_or_else(|| effect.rest(x));
+            let mut own = memory.clone().unwrap_or_else(|| effect.rest(x, None));
             (effect.sense(&mut own, x, moment(k)).0, own)
         };
         before = zero_of(|x| show(x).0 - wanted, before, STEP * size, ALL);

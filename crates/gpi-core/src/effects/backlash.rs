@@ -114,12 +114,11 @@ impl OutputStage for Backlash {
         self.output
     }
 
-    /// The latest output; at first the end of the gap that is nearest to zero. A force remembers nothing.
-    fn rest(&self, first: f64) -> Vec<f64> {
-        match self.missing {
-            None => vec![play(self.half_width, first, 0.0)],
-            Some(_) => Vec::new(),
-        }
+    /// The latest output. At first it is as near to zero as the gap lets it be, or in motion at `first + side b`. A force remembers nothing.
+    fn rest(&self, first: f64, side: Option<f64>) -> Vec<f64> {
+        let at_rest = || play(self.half_width, first, 0.0);
+        let latest = side.map_or_else(at_rest, |side| first + side * self.half_width);
+        if self.missing.is_none() { vec![latest] } else { Vec::new() }
     }
 
     fn is_pinched(&self) -> bool {
@@ -147,7 +146,7 @@ mod tests {
     fn a_force_lacks_a_part_of_its_stiffness_while_the_gap_is_open() {
         let own = Backlash { output: 0, half_width: 0.5, missing: Some(0.75) };
         let moment = Moment { time: 0.0, rate: 1.0, covariates: &[] };
-        let sense = |force: f64| own.sense(&mut own.rest(force), force, moment);
+        let sense = |force: f64| own.sense(&mut own.rest(force, None), force, moment);
         assert_eq!(sense(0.25), (0.0625, Slope::Times(0.25)));
         assert_eq!(sense(2.0), (2.0 - 0.375, Slope::Times(1.0)));
         assert_eq!(sense(-2.0), (-2.0 + 0.375, Slope::Times(1.0)));

@@ -60,7 +60,7 @@ impl Base<'_> {
         let mut with_residual = DVector::zeros(n);
         for (index, experiment) in self.record.experiments().iter().enumerate() {
             let known = &self.signals[index];
-            let here = self.point.output(known);
+            let here = self.point.output(known, index);
             let columns = columns(known, &here, experiment, index)?.into_iter();
             let columns: Vec<Matrix> =
                 columns.map(|column| whitened(column, experiment, self.loss)).collect();

@@ -29,7 +29,7 @@ pub(super) fn in_words(point: &Point, record: &Record) -> Option<String> {
     let moment = Moment { time: 0.0, rate: point.rate, covariates: &[] };
     let force = point
         .output_stages()
-        .fold(elastic, |force, own| own.sense(&mut own.rest(force), force, moment).0);
+        .fold(elastic, |force, own| own.sense(&mut own.rest(force, None), force, moment).0);
     let unit = |channel: &Channel| match &channel.unit[..] {
         "" => String::new(),
         unit => format!(" {unit}"),

@@ -16,7 +16,6 @@ use crate::operators::Reading;
 use crate::optimize::{Loss, Status};
 use crate::progress::{Overall, Progress, Report};
 use crate::{Channel, Error, Experiment, Hysteresis, Intersample, Matrix, Record};
-use nalgebra::DVector;
 
 /// A hysteresis fitted to an input and an intermediate signal.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,7 +100,7 @@ pub fn fit_hysteresis(
         intersample: Intersample::default(),
         effects: Vec::new(),
         rate: 1.0,
-        pasts: vec![Past { plays, has_unknown_state: true, state: DVector::zeros(0) }],
+        pasts: vec![Past { plays, has_unknown_state: true, ..Past::rest(0, 1) }],
         offsets: vec![Matrix::from_element(1, 1, experiment.output.mean())],
     };
     let freedom = Freedom {

@@ -18,7 +18,6 @@ use crate::fit::model_sections::sections_of;
 use crate::fit::settings::{FitSettings, PreparationSettings};
 use crate::linear::Sections;
 use crate::{Error, Experiment, Intersample, Matrix, Model, Record};
-use nalgebra::DVector;
 
 /// A record made ready, and hysteresis parameters to start from.
 #[derive(Clone)]
@@ -132,11 +131,9 @@ impl<'a> Prepared<'a> {
 
     /// The prepared hysteresis before given dynamics.
     pub(crate) fn point(&self, dynamics: Sections) -> Point {
-        let state = DVector::zeros(dynamics.order());
         let past = |&has_unknown_state: &bool| Past {
-            plays: None,
             has_unknown_state,
-            state: state.clone(),
+            ..Past::rest(dynamics.order(), self.means.len())
         };
         let pasts: Vec<Past> = self.has_unknown_state.iter().map(past).collect();
         let offsets = vec![Matrix::zeros(1, self.means.len()); pasts.len()];

@@ -13,7 +13,7 @@
 //! The offset and the initial state of an experiment move its own output only. The products of an experiment are therefore
 //! those of the shared unknowns and its own ones, and the Gram matrix of all unknowns has the shape of an arrow.
 //!
-//! Where the hysteresis has a prior ([`crate::chain::prior`]), its terms are added to all three.
+//! Where something has a prior ([`crate::chain::prior`]), its terms are added to all three.
 //!
 //! Where the noise has a memory ([`Loss`]), e and psi are those that its past does not predict.
 //!
@@ -28,7 +28,6 @@ use super::representatives::{representatives, streamed};
 use super::settings::ROUNDING;
 use crate::chain::adjoint::descent;
 use crate::chain::point::{Freedom, Point};
-use crate::chain::prior::add_prior;
 use crate::chain::stream::{Rows, Stream};
 use crate::chain::table::Table;
 use crate::linear::{Arrow, NormalEquations};
@@ -83,16 +82,15 @@ impl LeastSquares for Estimation<'_> {
             gram.add_part(&part.gram, &places);
             places.iter().zip(part.rhs.iter()).for_each(|(&i, value)| descent[i] += value);
         }
-        let prior = point.prior(&self.table);
         let Some(few) = few else {
-            add_prior(&prior, &mut gram);
+            point.curve(&self.table, &mut gram);
             let penalty = point.penalise(&self.table, &mut descent);
             return Ok(Linearization { gram, descent, cost: cost + penalty, age: None });
         };
         let mut gram = gram.to_dense();
         few.extend(&mut gram, &self.table, self.record);
         let mut gram = gram.into();
-        add_prior(&prior, &mut gram);
+        point.curve(&self.table, &mut gram);
         let (descent, cost) = self.gradient(point, check)?;
         Ok(Linearization { gram, descent, cost, age: Some(0) })
     }
@@ -196,6 +194,7 @@ mod tests {
         point.channels[0].prior = Prior { weights: 0.3, slopes: 0.2 };
         point.dynamics.delay = 2;
         point.pasts[1].state.iter_mut().enumerate().for_each(|(j, x)| *x = 0.1 * (j + 1) as f64);
+        point.pasts[1].gaps[1] = 0.3;
         let freedom = Freedom {
             weights: true,
             offsets: true,

@@ -168,7 +168,7 @@ impl Bands {
     pub fn loop_deviations(&self, input: &Matrix) -> Result<Matrix, Error> {
         let inputs = self.point.channels.len();
         Error::require_equal("channels", ("input", input.ncols()), ("model", inputs))?;
-        let rest = Past { plays: None, has_unknown_state: false, state: DVector::zeros(0) };
+        let rest = Past::rest(0, 0);
         let deviations =
             self.spread(|point| Ok(point.intermediate(input, &rest).as_slice().to_vec()))?;
         Ok(Matrix::from_column_slice(input.nrows(), inputs, &deviations))

@@ -27,8 +27,9 @@ pub trait OutputStage: Block + Sync {
     /// The output channel.
     fn output(&self) -> usize;
 
-    /// The state after the displacement has been constant at `first`.
-    fn rest(&self, _first: f64) -> Vec<f64> {
+    /// The state before the displacement `first`: after it has been constant, or, in motion, on `side` of what may hold the reading (-1
+    /// to 1). Empty if the reading depends on the present displacement alone.
+    fn rest(&self, _first: f64, _side: Option<f64>) -> Vec<f64> {
         Vec::new()
     }
 

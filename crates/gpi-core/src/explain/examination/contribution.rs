@@ -17,7 +17,7 @@ pub(super) fn contribution(
     experiment: &Experiment,
     index: usize,
 ) -> Result<(Matrix, Matrix), Error> {
-    let with = point.output(known);
-    let rest = without.output(&without.signals(experiment, index)?);
+    let with = point.output(known, index);
+    let rest = without.output(&without.signals(experiment, index)?, index);
     Ok((with - &rest, rest))
 }
