@@ -1,11 +1,22 @@
 //! A point without hysteresis, for tests.
 
 use super::hysteresis::Parameters;
-use super::point::{Past, Point};
+use super::point::{DynamicsFreedom, Freedom, Past, Point};
+use super::sensitivity::Derivatives;
 use crate::effects::Effect;
 use crate::linear::{Sections, TransferFunction};
 use crate::operators::Reading;
 use crate::{Intersample, Matrix};
+
+/// Everything but thresholds, half-widths and initial places of plays, of which a point without hysteresis has none.
+pub(crate) const FREE: Freedom = Freedom {
+    weights: true,
+    offsets: true,
+    derivatives: Derivatives { thresholds: false, half_widths: false, starts: false },
+    states: true,
+    identity: true,
+    dynamics: DynamicsFreedom::Everything,
+};
 
 /// A transfer function of one input and one output, at rest before one experiment sampled at 1 kHz.
 pub(crate) fn plain(numerator: &[f64], denominator: &[f64], effects: Vec<Effect>) -> Point {

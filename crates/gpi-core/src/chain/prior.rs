@@ -19,7 +19,7 @@
 //! ```
 //!
 //! is added to the cost. The sections are in observer form, so that a state is about as large as what it adds to the output: x counts as if
-//! one sample had shown a thousandth of it, and a state that any sample shows is not changed.
+//! one sample had shown a thousandth of it, and a state that any sample shows hardly changes.
 //!
 //! Source: G. Pillonetto, F. Dinuzzo, T. Chen, G. De Nicolao, L. Ljung, *Kernel methods in system identification, machine learning and function
 //! estimation: a survey*, Automatica 50, 2014.
@@ -159,9 +159,7 @@ fn second_differences(count: usize) -> Matrix {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::plain::plain;
-    use crate::chain::point::{DynamicsFreedom, Freedom};
-    use crate::chain::sensitivity::Derivatives;
+    use crate::chain::plain::{FREE, plain};
     use crate::effects::Backlash;
 
     #[test]
@@ -172,15 +170,7 @@ mod tests {
             let mut point = plain(&[0.0, 0.3], &[1.0, -0.7], effects);
             point.pasts[0].has_unknown_state = true;
             point.pasts[0].state[0] = 2.0;
-            let freedom = Freedom {
-                weights: true,
-                offsets: true,
-                derivatives: Derivatives::default(),
-                states: true,
-                identity: true,
-                dynamics: DynamicsFreedom::Everything,
-            };
-            let table = Table::new(&point, freedom);
+            let table = Table::new(&point, FREE);
             let state = table.range(Group::State { experiment: 0 }).start;
             assert_eq!(table.is_linear(state), !is_hidden);
             let mut gram = Arrow::zeros(table.len, table.own());

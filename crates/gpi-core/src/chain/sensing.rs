@@ -77,9 +77,7 @@ impl Slope {
 
 #[cfg(test)]
 mod tests {
-    use crate::chain::plain::plain;
-    use crate::chain::point::{DynamicsFreedom, Freedom};
-    use crate::chain::sensitivity::Derivatives;
+    use crate::chain::plain::{FREE, plain};
     use crate::chain::stream::Stream;
     use crate::chain::table::{Group, Table};
     use crate::effects::Backlash;
@@ -96,19 +94,11 @@ mod tests {
         let run = Experiment::new(u.clone(), u);
         let channel = |name| vec![Channel::new(name, "")];
         let record = Record::new(vec![run], 1e3, channel("u"), channel("y"), vec![]).unwrap();
-        let freedom = Freedom {
-            weights: true,
-            offsets: true,
-            derivatives: Derivatives::default(),
-            states: true,
-            identity: true,
-            dynamics: DynamicsFreedom::Everything,
-        };
-        let table = Table::new(&point, freedom);
+        let table = Table::new(&point, FREE);
         let side = table.range(Group::Gaps { experiment: 0 });
         assert_eq!(table.names(&point, &record)[side.clone()], ["start[0].gap[y]"]);
         let experiment = &record.experiments()[0];
-        let stream = Stream::new(&point, &table, freedom.derivatives, experiment, 0);
+        let stream = Stream::new(&point, &table, FREE.derivatives, experiment, 0);
         let mut columns = Matrix::zeros(table.len, 150);
         let mut first = 0;
         let mut take = |rows: crate::chain::stream::Rows| {

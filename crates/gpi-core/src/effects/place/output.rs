@@ -27,8 +27,8 @@ pub trait OutputStage: Block + Sync {
     /// The output channel.
     fn output(&self) -> usize;
 
-    /// The state before the displacement `first`: after it has been constant, or, in motion, on `side` of what may hold the reading (-1
-    /// to 1). Empty if the reading depends on the present displacement alone.
+    /// The state before the displacement `first`. At rest (no `side`), the displacement has been constant. In motion, the reading stands
+    /// `side` half-widths of the gap from the displacement (-1 to 1). Empty if the reading depends on the present displacement alone.
     fn rest(&self, _first: f64, _side: Option<f64>) -> Vec<f64> {
         Vec::new()
     }
