@@ -131,6 +131,14 @@ def summary(results: Sequence[Result]) -> Table:
     return Table("Summary", ("what", "figure"), rows)
 
 
+def pieces(results: Sequence[Result]) -> Table:
+    """Count the pieces of long records in which a false effect is named, and those with the right answer."""
+    false = sum(result.has_false() for result in results)
+    every = sum(sorted(result.may or ()) == sorted(result.found) for result in results)
+    rows = [("a false effect is named", str(false)), ("every effect is named, and no other", str(every))]
+    return Table("Pieces of long records", ("answers", f"of {len(results)}"), rows)
+
+
 def clean(results: Sequence[Result]) -> Table:
     """Return the errors of stages that lack nothing on another experiment, over the noise, by their kind.
 

@@ -25,7 +25,7 @@ import textbook_tables  # noqa: E402
 from data_folder import DEV, FOREIGN  # noqa: E402
 from gpi_hammerstein.files import write_atomically  # noqa: E402
 from plants import textbook  # noqa: E402
-from scores import Result, clean, foreign, labelled, of_copy, of_textbook, simulated  # noqa: E402
+from scores import Result, clean, foreign, labelled, of_copy, of_textbook, piece, simulated  # noqa: E402
 
 # Effects of the simulated plants. G's order and delay are left out: here, the declared model contains them.
 SINGLE = [name for name in plants.CATALOGUE if name not in ("delay", "linear-dynamics")]
@@ -138,6 +138,14 @@ def clean_work(arguments: argparse.Namespace) -> Iterator[Job]:
                 yield function, (folder, name)
 
 
+def piece_work(arguments: argparse.Namespace) -> Iterator[Job]:
+    """Yield pieces of long records of stages with two effects; every fifth one lacks nothing."""
+    random = np.random.default_rng(arguments.seed)
+    for number in range(arguments.pieces):
+        drawn = tuple(str(name) for name in random.choice(arguments.effects, 2, replace=False))
+        yield piece, (arguments.seed + number, drawn if number % 5 else (), arguments.seconds)
+
+
 def copies(work: Iterable[Job], seed: int | None) -> Iterator[Job]:
     """Yield the jobs, or those of changed copies of their records where there is a seed."""
     for function, values in work:
@@ -213,6 +221,13 @@ def main() -> None:
         help="N records each of simulated and of textbook stages that lack nothing, and the labelled ones",
     )
     parser.add_argument(
+        "--pieces",
+        type=int,
+        default=0,
+        metavar="N",
+        help="N pieces cut out of long records while the stage moves, in which no false effect may be named",
+    )
+    parser.add_argument(
         "--copy",
         type=int,
         metavar="SEED",
@@ -250,13 +265,14 @@ def main() -> None:
     kept = Kept(arguments.keep)
     print(HEAD, flush=True)
     with ProcessPoolExecutor(max_workers=arguments.processes) as pool:
-        mixed, near_noise, other, lacking_nothing = (
+        mixed, near_noise, other, lacking_nothing, cut = (
             run(pool, copies(work, arguments.copy), kept)
             for work in (
                 mixed_work(arguments),
                 power_work(arguments) if arguments.power else [],
                 textbook_work(arguments),
                 clean_work(arguments),
+                piece_work(arguments),
             )
         )
     tables = []
@@ -269,9 +285,11 @@ def main() -> None:
         tables.append(textbook_tables.mistakes(other, reproduced))
     if lacking_nothing:
         tables.append(score_tables.clean(lacking_nothing))
+    if cut:
+        tables.append(score_tables.pieces(cut))
     for table in tables:
         print(table.text())
-    seconds = [result.seconds for result in (*mixed, *near_noise, *other, *lacking_nothing)]
+    seconds = [result.seconds for result in (*mixed, *near_noise, *other, *lacking_nothing, *cut)]
     if seconds:
         print(f"\ntime: median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s")
     if arguments.markdown is not None:

@@ -23,6 +23,8 @@ REFUSED = "refused"
 ABSORBED = 1.05
 # Relative change of each output sample of a changed copy: far below any noise, and far above rounding.
 CHANGE = 1e-9
+# Sampling rate in Hz of long records from which pieces are cut.
+RATE_OF_PIECES = 1000.0
 # Seed of the changes, if copies are explained.
 COPY: ContextVar[int | None] = ContextVar("COPY", default=None)
 
@@ -179,6 +181,26 @@ def simulated(seed: int, effects: tuple[str, ...], strength: float | None, secon
     wanted = () if is_outside else effects
     name = f"plant {seed} {'+'.join(plant.effects) if is_outside else ''}".strip()
     return explained(name, wanted, record, again, plant.noise_std, is_outside=is_outside, strength=strength)
+
+
+def piece(seed: int, effects: tuple[str, ...], seconds: float) -> Result:
+    """Explain a piece of a record that is ten times as long, cut out while the stage moves.
+
+    Slow effects are older than the piece, and its excitation may be a single one, so that no effect has to be
+    named. None may be named that the stage does not have.
+    """
+    plant = plants.draw(seed, effects, None, 10.0 * seconds, RATE_OF_PIECES, in_motion=False)
+    samples = round(RATE_OF_PIECES * seconds)
+    first = int(np.random.default_rng(seed).integers(samples, 9 * samples))
+    record, again = (as_record(cut(plant.record(number), first, first + samples)) for number in (0, 1))
+    name = f"piece of plant {seed}, {first / RATE_OF_PIECES:.0f} s"
+    return explained(name, (), record, again, plant.noise_std, may=effects)
+
+
+def cut(run: plants.Recording, first: int, end: int) -> plants.Recording:
+    """Return the samples of a recording from the first one to before the end."""
+    column = None if run.x is None else run.x[first:end]
+    return replace(run, t=run.t[first:end], u=run.u[first:end], y=run.y[first:end], x=column)
 
 
 def clean(seed: int, seconds: float) -> Result:

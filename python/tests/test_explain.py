@@ -138,6 +138,25 @@ def test_a_fit_that_ends_far_above_the_noise_begins_again_at_another_law():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("number", "first", "effects"),
+    [
+        (0, 100, ["backlash", "creep"]),
+        (0, 400, ["backlash", "creep"]),
+        (1, 400, ["backlash", "creep"]),
+        # a sine, whose fourth harmonic a resonance amplifies
+        (0, 850, []),
+    ],
+)
+def test_a_piece_of_a_long_record_gets_no_false_name(number, first, effects):
+    # the creep is older than the piece
+    run = plants.draw(3, ("creep", "backlash"), seconds=1000.0, rate=1000.0).record(number)
+    piece = slice(1000 * first, 1000 * (first + 30))
+    found = gpi.explain(gpi.Record(run.u[piece], run.y[piece], 1000.0))
+    assert sorted(found.effects) == effects
+
+
+@pytest.mark.slow
 def test_a_spring_that_softens_up_to_a_limit_needs_no_second_name():
     # its force is no cube: four powers of the displacement take the place of a hysteretic force
     plant = plants.draw(1081, ("stiffness",), None, 30.0)

@@ -164,11 +164,8 @@ impl ParallelSections for Creep {
     }
 
     fn set_sections(&mut self, sections: &[Coefficients], rate: f64) {
-        for (i, (a, b)) in sections.iter().enumerate() {
-            let pole = -a[0];
-            self.time_constants[i] = -1.0 / (rate * pole.ln());
-            self.gains[i] = b[0] / (1.0 - pole);
-        }
+        let lag = |(a, b): &Coefficients| (-1.0 / (rate * (-a[0]).ln()), b[0] / (1.0 + a[0]));
+        (self.time_constants, self.gains) = sections.iter().map(lag).unzip();
     }
 
     fn dead_time(&self) -> usize {

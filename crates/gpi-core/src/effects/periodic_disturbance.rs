@@ -118,10 +118,15 @@ fn outstanding(situation: &Situation, output: usize) -> Vec<f64> {
 /// The power that an error of the model may have at each line. A weaker line is no evidence of a disturbance.
 ///
 /// An error of the model is strong where the displacement is. If the only input has most of its power in one line (a sine, a
-/// triangle), it is also strong at the harmonics.
+/// triangle), it is also strong at the harmonics, and then at many of them: a disturbance at one of them leaves its neighbours weak.
 fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
     /// The n-th harmonic of an error of the model is at most this over n of the displacement's fundamental.
     const MISFIT: f64 = 0.02;
+    /// The n-th harmonic of an error of the model over the largest of the four harmonics around it, at most. By hand: a resonance
+    /// amplifies it by as much.
+    const AMPLIFIED: f64 = 10.0;
+    /// Lines between harmonics from which a disturbance at one of them does not reach the next.
+    const APART: f64 = 20.0;
     /// Smallest part of the input's power in its strongest line.
     const MOST: f64 = 0.9;
     /// The error of the model over the displacement at a line, over the same for the whole signals, at most. By hand: an error
@@ -143,8 +148,14 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
         && line.part > MOST
     {
         let fundamental = largest(line.place);
+        let errors = power(&residual);
+        let error = |n: usize| errors[near(n as f64 * line.place, count)].iter().copied().fold(0.0, f64::max);
         for n in 1..=(count as f64 / line.place) as usize {
+            let around = [n.saturating_sub(2), n.saturating_sub(1), n + 1, n + 2];
+            let around = around.into_iter().filter(|&n| n > 1 && line.place > APART);
+            let around = around.map(error).fold(0.0, f64::max);
             let misfit = fundamental * (MISFIT / n as f64).powi(2);
+            let misfit = misfit.max(AMPLIFIED.powi(2) * around);
             for line in near(n as f64 * line.place, count) {
                 most[line] = most[line].max(misfit);
             }
@@ -244,14 +255,22 @@ mod tests {
     use crate::{Channel, Experiment, Matrix, Record};
     use std::f64::consts::TAU;
 
+    /// Frequencies and amplitudes of sines.
+    type Sines<'a> = &'a [(f64, f64)];
+
     /// The frequencies that are proposed where the displacement is a sine of 3 Hz and weaker ones of 7 Hz and 31 Hz, of changing size,
-    /// and the residual is white noise with sines of some frequencies and amplitudes.
-    fn proposed(lines: &[(f64, f64)]) -> Vec<f64> {
+    /// and the residual is white noise with other sines.
+    fn proposed(lines: Sines) -> Vec<f64> {
         proposed_behind(0, lines)
     }
 
     /// The same behind a warm-up of so many samples, in which an unknown initial state leaves a residual as large as the displacement.
-    fn proposed_behind(warmup: usize, lines: &[(f64, f64)]) -> Vec<f64> {
+    fn proposed_behind(warmup: usize, lines: Sines) -> Vec<f64> {
+        proposed_of(&[(3.0, 1.0), (7.0, 0.4), (31.0, 0.1)], warmup, lines)
+    }
+
+    /// The same for a displacement of other sines, which is the drive, too.
+    fn proposed_of(displaced: Sines, warmup: usize, lines: Sines) -> Vec<f64> {
         let (rate, n) = (200.0, 6000);
         let time = |k: usize| k as f64 / rate;
         let mut random = 11.0;
@@ -261,8 +280,8 @@ mod tests {
         };
         let size = |k: usize| 1.0 + 0.3 * (TAU * 0.08 * time(k)).sin();
         let sines = |k: usize| -> f64 {
-            let sine = |(frequency, size): (f64, f64)| size * (TAU * frequency * time(k)).sin();
-            [(3.0, 1.0), (7.0, 0.4), (31.0, 0.1)].into_iter().map(sine).sum()
+            let sine = |(frequency, size): &(f64, f64)| size * (TAU * frequency * time(k)).sin();
+            displaced.iter().map(sine).sum()
         };
         let u = Matrix::from_fn(n, 1, |k, _| size(k) * sines(k));
         let sum = |k: usize| -> f64 {
@@ -300,6 +319,18 @@ mod tests {
         assert!(!is(&proposed(&[(3.0, 0.1)]), 3.0));
         // far more than the error that the rest has
         assert!(is(&proposed(&[(7.0, 0.5)]), 7.0));
+    }
+
+    #[test]
+    fn one_of_many_harmonics_is_no_disturbance() {
+        let harmonics: Vec<(f64, f64)> =
+            (17..26).map(|n| (3.0 * f64::from(n), 0.05 / (1.0 + f64::from(n % 4)))).collect();
+        let beside = |frequency: f64| (frequency / 3.0 - (frequency / 3.0).round()).abs() * 3.0;
+        let found = proposed_of(&[(3.0, 1.0)], 0, &harmonics);
+        assert!(found.iter().all(|&frequency| beside(frequency) > 0.15), "{found:?}");
+        // the same line without its neighbours
+        let found = proposed_of(&[(3.0, 1.0)], 0, &[(60.0, 0.05)]);
+        assert!((found[0] - 60.0).abs() < 0.01, "{found:?}");
     }
 
     #[test]

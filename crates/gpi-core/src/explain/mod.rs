@@ -19,8 +19,8 @@
 //!    beside plays. Their answer is given if it leaves no structure.
 //!
 //! The files import in one direction only: `policy` (every tolerance), `threshold`, `judgement`, `choice`, `base`, `projection`,
-//! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `sensor_range`, `trial`,
-//! `restart`, `examination`, `grid`, `revision`, `round`, `pairs`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
+//! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `sensor_range`, `slow_candidate`, `trial`,
+//! `restart`, `examination`, `grid`, `revision`, `round`, `slow_poles`, `pairs`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
 
 pub(crate) mod base;
 mod blocks;
@@ -56,6 +56,8 @@ mod search;
 mod sensor_range;
 mod setup;
 mod slip;
+mod slow_candidate;
+mod slow_poles;
 mod state;
 mod steps;
 mod surpassing;
@@ -202,12 +204,8 @@ fn explain_once(
     let mut progress = |report: &Report| overall.take(report);
     revision::shed_lines(&mut state, &mut progress)?;
     let base = state.point.clone();
-    // the last fit of the declared model may have led a pole to creep
-    revision::shed_lags(&mut state, &mut progress)?;
     let mut interrupted = is_interrupted(search::run(&mut state, &mut progress))?;
-    if interrupted {
-        revision::settle_lags(&mut state)?;
-    } else {
+    if !interrupted {
         interrupted =
             is_interrupted(coloured::search_weighed(&mut state, &weighed, &mut progress))?;
     }

@@ -11,7 +11,7 @@
 //! | an added signal moves to the other side of the output stage | `J_moved < (1 - f) J` |
 //! | of an effect that later fits have made impossible, the plausible terms stay | `J_terms < (1 - f) J_without` |
 //! | a slow function of time is replaced | see [`super::exchange`] |
-//! | an effect replaces slow poles of G | `J_effect <= f J_poles` at the end of the search, else the poles return |
+//! | an effect replaces slow poles of G | see [`super::slow_poles`] |
 //! | a mode of G that follows a line, or rings on, is taken out | always ([`crate::fit::line_modes`]) |
 //!
 //! An effect that was accepted early, with little else in the model, has often taken what belongs to a later one. The
@@ -20,11 +20,12 @@
 
 use super::judgement::is_superfluous;
 use super::ranking::scored_beside;
-use super::state::{BeforeLags, SearchState};
+use super::state::SearchState;
 use super::trial::{fitted, plausible_part, start};
 use crate::Error;
 use crate::Progress;
-use crate::effects::{Entry, FreeOrder, Place, Signature};
+use crate::chain::point::Point;
+use crate::effects::{Entry, Place, Signature};
 use crate::fit::line_modes::{is_same, line_modes};
 use crate::fit::memory::Memory;
 use crate::fit::minimize::Fitted;
@@ -68,7 +69,10 @@ pub(super) fn drop_superfluous(state: &mut SearchState, progress: Progress) -> R
         let fitted = as_trial(progress, ("examination", name), (0, 1), |progress| {
             without(state, place, newest.entry, goal, progress)
         })?;
-        let lost = state.prepared.values() * (fitted.linearization.cost / state.cost).ln();
+        let values = state.prepared.values();
+        let unknowns = |point| state.setup.unknowns(point);
+        let more = unknowns(&fitted.point).saturating_sub(unknowns(&state.point)) as f64;
+        let lost = values * (fitted.linearization.cost / state.cost).ln() + more * values.ln();
         let now = state.held_out(&state.point)?;
         let then = state.held_out(&fitted.point)?;
         let factor = state.setup.policy.revision.superfluous;
@@ -153,7 +157,8 @@ pub(super) fn shed_sections(state: &mut SearchState, progress: Progress) -> Resu
 }
 
 /// The best fit without one of the effects. The newest effect is also started from the score test again, because in the
-/// presence of the dropped one it may have moved to where no fit leads back from. Squares above `goal` are not asked for.
+/// presence of the dropped one it may have moved to where no fit leads back from, and more of it is added where it repeats: the dropped
+/// one may have done a part of it. Squares above `goal` are not asked for.
 fn without(
     state: &SearchState,
     place: usize,
@@ -162,39 +167,38 @@ fn without(
     progress: Progress,
 ) -> Result<Fitted, Error> {
     let without = state.point.without_effect(place);
-    let (refitted, _) = fitted(state, without.clone(), newest, goal, progress)?;
+    let (mut best, _) = fitted(state, without.clone(), newest, goal, progress)?;
     let own = without.effects.iter().rposition(|effect| effect.name() == newest.name);
-    let Some(own) = own.filter(|_| newest.driven) else { return Ok(refitted) };
-    let point = without.without_effect(own);
-    let best = scored_beside(state, &point, &[newest], progress)?.into_iter().next();
-    let Some(best) = best else { return Ok(refitted) };
-    let start = start(state, &point, best.score)?;
-    let (anew, _) = fitted(state, start, newest, goal, progress)?;
-    let is_better = anew.linearization.cost < refitted.linearization.cost;
-    Ok(if is_better { anew } else { refitted })
+    let Some(own) = own.filter(|_| newest.driven) else { return Ok(best) };
+    let anew = beside(state, &without.without_effect(own), newest, goal, progress)?;
+    best = better(best, anew);
+    if best.linearization.cost > goal && newest.repeats {
+        let more = beside(state, &best.point, newest, goal, progress)?;
+        best = better(best, more);
+    }
+    Ok(best)
 }
 
-/// Takes slow poles out of G that came when something else was fitted, so that the next round can name the effect that
-/// hides in them; says whether there were any.
-pub(super) fn shed_lags(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
-    let hides = |entry: &&Entry| entry.free_order == FreeOrder::HidesInSlowPoles;
-    let may_hide = state.setup.allowed.iter().copied().filter(hides).any(|entry| !state.has(entry));
-    if !may_hide || state.setup.order_is_given || state.before_lags.is_some() {
-        return Ok(false);
+/// The fit of an effect beside a model from where the score test says, if it promises anything.
+fn beside(
+    state: &SearchState,
+    point: &Point,
+    entry: &'static Entry,
+    goal: f64,
+    progress: Progress,
+) -> Result<Option<Fitted>, Error> {
+    let best = scored_beside(state, point, &[entry], progress)?.into_iter().next();
+    let Some(best) = best else { return Ok(None) };
+    let start = start(state, point, best.score)?;
+    Ok(Some(fitted(state, start, entry, goal, progress)?.0))
+}
+
+/// The fit that leaves less.
+fn better(one: Fitted, other: Option<Fitted>) -> Fitted {
+    match other {
+        Some(other) if other.linearization.cost < one.linearization.cost => other,
+        _ => one,
     }
-    let memory = Memory::of(&state.prepared.record);
-    let lags = memory.slow_lags(&state.point, &state.prepared)?;
-    let Some(point) = state.point.without(|pole| lags.iter().any(|lag| is_same(lag, pole)))? else {
-        return Ok(false);
-    };
-    let fitted = state.fit(point, &state.setup.options, "slow poles", progress)?;
-    let before = std::mem::replace(&mut state.point, fitted.point);
-    let additions = state.additions.clone();
-    state.before_lags = Some(BeforeLags { point: before, cost: state.cost, additions });
-    state.cost = fitted.linearization.cost;
-    state.left.clear();
-    state.is_rich = false;
-    Ok(true)
 }
 
 /// Takes modes out of G that follow a line of the mains or ring for a large part of the record, so that the next round can name it; says whether there were any.
@@ -214,20 +218,4 @@ pub(super) fn shed_lines(state: &mut SearchState, progress: Progress) -> Result<
     state.left.clear();
     state.is_rich = false;
     Ok(true)
-}
-
-/// Goes back to what was before slow poles were taken out, where no effect explains as much as they did; says whether it
-/// did. What was refused since then has returned too, and is to be examined again.
-pub(super) fn settle_lags(state: &mut SearchState) -> Result<bool, Error> {
-    let Some(before) = state.before_lags.take() else { return Ok(false) };
-    let most = state.setup.policy.revision.instead_of_lags * before.cost;
-    let returns = state.additions.len() <= before.additions.len() || state.cost > most;
-    if returns {
-        (state.point, state.additions) = (before.point, before.additions);
-        let point = &state.point;
-        let has = |name| point.effects.iter().any(|effect| effect.name() == name);
-        state.refused.retain(|one| !has(one.effect));
-        state.repair()?;
-    }
-    Ok(returns)
 }

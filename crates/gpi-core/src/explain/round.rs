@@ -11,6 +11,7 @@ use super::refusal::Refusal;
 use super::restart::from_others;
 use super::revision::{drop_superfluous, rearrange, shed_sections, straighten};
 use super::sensor_range;
+use super::slow_candidate;
 use super::state::{Addition, Rejected, SearchState, Trial};
 use super::steps::finer_steps;
 use super::trial::{join_modes, trials};
@@ -72,7 +73,10 @@ fn candidates(state: &mut SearchState, progress: Progress) -> Result<Option<Vec<
     if forces.is_empty() && most < policy.ranking.hopeless * policy.judgement.least {
         return Ok(None);
     }
-    best.truncate(policy.ranking.fitted);
+    // more of what the model has needs no new name
+    let rest = best.split_off(policy.ranking.fitted.min(best.len()));
+    best.extend(rest.into_iter().filter(|one| state.is_more(one.entry)));
+    best.extend(slow_candidate::candidate(state, &best)?);
     best.extend(forces);
     best.extend(sensor_range::candidate(state)?);
     Ok(Some(best))

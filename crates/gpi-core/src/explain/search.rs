@@ -7,8 +7,9 @@ use super::force_at_input::enter_with_input;
 use super::pairs::add_pair;
 use super::ranking::scored_beside;
 use super::refusal::Refusal;
-use super::revision::{keep_plausible, settle_lags, shed_lags, shed_lines, straighten};
+use super::revision::{keep_plausible, shed_lines, straighten};
 use super::round::round;
+use super::slow_poles::name_lags;
 use super::state::{Addition, Rejected, SearchState};
 use super::trial::trial;
 use crate::Error;
@@ -28,9 +29,6 @@ pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Err
             break;
         }
     }
-    if settle_lags(state)? {
-        examine_all(state, progress)?;
-    }
     enter_with_input(state, progress)?;
     straighten(state, progress)
 }
@@ -39,10 +37,10 @@ pub(super) fn run(state: &mut SearchState, progress: Progress) -> Result<(), Err
 fn add_effects(state: &mut SearchState, progress: Progress) -> Result<(), Error> {
     for _ in 0..state.setup.policy.revision.rounds {
         // a finer grid or a longer fit may have led a mode to a line
-        let is_changed = round(state, progress)?
+        let is_changed = name_lags(state, progress)?
+            || round(state, progress)?
             || add_pair(state, progress)?
-            || shed_lines(state, progress)?
-            || shed_lags(state, progress)?;
+            || shed_lines(state, progress)?;
         if !is_changed {
             break;
         }

@@ -30,6 +30,7 @@ use crate::identify::NoiseFloor;
 use crate::progress::Progress;
 use crate::uncertainty::outliers;
 use crate::{Error, Record};
+use nalgebra::Complex;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
@@ -98,14 +99,15 @@ impl Addition {
 }
 
 /// The model before slow poles were taken out of its G.
-pub(super) struct BeforeLags {
+#[derive(Clone)]
+pub(super) struct WithLags {
     pub point: Point,
-    pub cost: f64,
-    /// What had been added.
-    pub additions: Vec<Addition>,
+    /// These poles.
+    pub lags: Vec<Complex<f64>>,
 }
 
 /// The state of a search.
+#[derive(Clone)]
 pub(super) struct SearchState<'a> {
     /// What never changes.
     pub setup: &'a SearchSetup,
@@ -117,8 +119,10 @@ pub(super) struct SearchState<'a> {
     pub cost: f64,
     /// Whether the grids were refined since the latest effect.
     pub is_rich: bool,
-    /// What to go back to where no effect explains what slow poles of G did.
-    pub before_lags: Option<BeforeLags>,
+    /// The model before slow poles were taken out, while it is asked which effect does what they did.
+    pub with_lags: Option<WithLags>,
+    /// Names of the effects beside which that was asked last, and the number of the poles.
+    pub lags_asked: Option<(Vec<&'static str>, usize)>,
     /// What was added.
     pub additions: Vec<Addition>,
     /// The models before each addition. Emptied when poles are taken out of G, because these models still have them.
@@ -151,7 +155,8 @@ impl<'a> SearchState<'a> {
             point: refined.fitted.point.clone(),
             cost: refined.fitted.linearization.cost,
             is_rich: false,
-            before_lags: None,
+            with_lags: None,
+            lags_asked: None,
             additions: Vec::new(),
             left: Vec::new(),
             wrong: Vec::new(),
@@ -173,7 +178,8 @@ impl<'a> SearchState<'a> {
             point: self.point.clone(),
             cost: self.cost,
             is_rich: false,
-            before_lags: None,
+            with_lags: None,
+            lags_asked: None,
             additions: self.additions.clone(),
             left: self.left.clone(),
             wrong: self.wrong.clone(),

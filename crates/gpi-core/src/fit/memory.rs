@@ -7,7 +7,7 @@
 //! not creep, but it may be a disturbance.
 
 use crate::chain::point::Point;
-use crate::effects::longest_lag;
+use crate::effects::{Coefficients, Effect, PlaceMut, longest_lag};
 use crate::fit::preparation::{Prepared, rescale};
 use crate::fit::settings::MemorySettings;
 use crate::linear::{Sections, resonates};
@@ -171,25 +171,60 @@ impl Point {
         if self.loops().next().is_some() {
             return Ok(self.without_sections(unwanted));
         }
-        let own = &self.dynamics;
-        if !own.poles().iter().any(&unwanted) {
-            return Ok(None);
-        }
-        let whole = Sections::from_delayed_state_space(&own.to_state_space()?)?;
-        let dynamics = whole.with_poles(|pole| !unwanted(pole));
-        if dynamics.sections.is_empty() || dynamics.poles().iter().any(unwanted) {
-            return Ok(None);
-        }
+        let Some((_, rest)) = self.split(unwanted)? else { return Ok(None) };
         let mut point = self.clone();
-        point.replace_dynamics(dynamics);
+        point.replace_dynamics(rest);
         rescale(&mut point);
         Ok(Some(point))
+    }
+
+    /// The same with lags of G as the sections of an effect in parallel with it, which it does not have yet. The output changes only with
+    /// the initial states of G, which are zero. `None` beside loops, where G has no such lags, or none else, and where it has several
+    /// inputs or outputs.
+    pub(crate) fn with_lags_in(
+        &self,
+        mut effect: Effect,
+        is_lag: impl Fn(&Complex<f64>) -> bool,
+    ) -> Result<Option<Self>, Error> {
+        if self.loops().next().is_some() || self.dynamics.d.len() > 1 {
+            return Ok(None);
+        }
+        let Some((whole, rest)) = self.split(&is_lag)? else { return Ok(None) };
+        let lags: Vec<Coefficients> = whole
+            .poles()
+            .iter()
+            .filter(|pole| is_lag(pole))
+            .flat_map(|lag| whole.with_poles(|pole| pole == lag).sections)
+            .map(|section| (section.a, (section.c * section.b).as_slice().to_vec()))
+            .collect();
+        let PlaceMut::Parallel(own) = effect.place_mut() else { return Ok(None) };
+        own.set_sections(&lags, self.rate);
+        let mut point = self.clone();
+        point.replace_dynamics(rest);
+        let mut point = point.with_effect(effect);
+        rescale(&mut point);
+        Ok(Some(point))
+    }
+
+    /// G with its delay counted, and the same without unwanted poles; `None` where it has no such poles, or none else.
+    fn split(
+        &self,
+        unwanted: impl Fn(&Complex<f64>) -> bool,
+    ) -> Result<Option<(Sections, Sections)>, Error> {
+        if !self.dynamics.poles().iter().any(&unwanted) {
+            return Ok(None);
+        }
+        let whole = Sections::from_delayed_state_space(&self.dynamics.to_state_space()?)?;
+        let rest = whole.with_poles(|pole| !unwanted(pole));
+        let is_part = !rest.sections.is_empty() && !rest.poles().iter().any(unwanted);
+        Ok(is_part.then_some((whole, rest)))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Creep;
     use crate::fit::Grid;
     use crate::identify::IdentifyOptions;
     use crate::identify::procedure::prepare;
@@ -252,6 +287,37 @@ mod tests {
         assert_eq!(part(300.0, creep()), 0.0);
         // a tank is nothing but its lag
         assert_eq!(part(100.0, lags(0.0, &[(1.0, (-1.0_f64 / 200.0).exp())])), 1.0);
+    }
+
+    #[test]
+    fn lags_become_those_of_an_effect_without_a_change_of_the_output() {
+        let (record, creep) = (record(), || Creep {
+            input: 0,
+            time_constants: vec![1.0],
+            gains: vec![0.0],
+            dead_time: 0,
+        });
+        let prepared = prepare(&record, &IdentifyOptions::default()).unwrap();
+        // the two slow lags are one section of G
+        let before = prepared.point(lags(0.5, &[(0.3, 0.8), (0.1, 0.99), (0.2, 0.998)]));
+        let after = before.with_lags_in(creep().into(), |pole| pole.re > 0.9).unwrap().unwrap();
+        assert_eq!((after.dynamics.order(), after.order()), (1, 3));
+        let difference: f64 = before
+            .residuals(&record)
+            .unwrap()
+            .iter()
+            .zip(&after.residuals(&record).unwrap())
+            .map(|(before, after)| (before - after).amax())
+            .fold(0.0, f64::max);
+        assert!(difference < 1e-9, "{difference}");
+        let mut lags = after.effects[0].values();
+        lags[..2].sort_by(f64::total_cmp);
+        let time = |pole: f64| -1e-3 / pole.ln();
+        assert!((lags[0] - time(0.99)).abs() < 1e-9 && (lags[1] - time(0.998)).abs() < 1e-9);
+        // all but 0.8 of the gain of 1.1 is theirs
+        assert!((lags[2] + lags[3] - 0.3 / 0.8).abs() < 1e-9, "{lags:?}");
+        assert!(before.with_lags_in(creep().into(), |pole| pole.re > 0.999).unwrap().is_none());
+        assert!(before.with_lags_in(creep().into(), |_| true).unwrap().is_none());
     }
 
     #[test]

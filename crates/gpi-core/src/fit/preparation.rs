@@ -272,7 +272,13 @@ pub(crate) fn rescale(point: &mut Point) {
     for (channel, gain) in point.channels.iter_mut().zip(&gains) {
         channel.weights.iter_mut().for_each(|weight| *weight *= gain);
     }
+    let rate = point.rate;
     for effect in &mut point.effects {
+        if let PlaceMut::Parallel(own) = effect.place_mut() {
+            let (gain, mut sections) = (gains[own.input()], own.sections(rate));
+            sections.iter_mut().flat_map(|(_, b)| b).for_each(|b| *b /= gain);
+            own.set_sections(&sections, rate);
+        }
         let PlaceMut::Loops(closed) = effect.place_mut() else { continue };
         for inner in closed.loops_mut() {
             if let Sees::Mixture { inputs, .. } = &mut inner.sees {

@@ -23,7 +23,7 @@ pub trait ParallelSections: Block {
     /// Takes the dead time of G in samples, which the sections share.
     fn set_dead_time(&mut self, samples: usize);
 
-    /// Takes estimated sections, as many as it has.
+    /// Takes estimated sections: as many as it has, or any number of first-order sections where it consists of such sections.
     fn set_sections(&mut self, sections: &[Coefficients], rate: f64);
 
     /// Smallest and largest a1 of the first-order sections.
