@@ -42,11 +42,12 @@
 //! (reverse mode).
 
 use super::between::{Between, Row};
+use super::group::Group;
 use super::injections::{Injection, Places, injections};
 use super::motion::{advance_adjoint, columns, rows};
 use super::point::{Freedom, Point};
 use super::stream::Stream;
-use super::table::{Group, Table};
+use super::table::Table;
 use super::tangents::{Trace, memories, sensed};
 use crate::effects::{InnerLoop, Sees, Slope};
 use crate::linear::{Section, dot};

@@ -5,9 +5,9 @@
 //! or of an earlier w ([`super::injections`]).
 
 use super::between::{Between, Row};
+use super::group::Group;
 use super::loops::loops_of;
 use super::point::Point;
-use super::table::Group;
 use crate::effects::{InnerLoop, Place};
 use crate::linear::Sections;
 

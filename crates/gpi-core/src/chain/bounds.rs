@@ -22,10 +22,11 @@
 //! half-width of the widest play that has a weight does. The row of C of the reference output fixes the scale of a
 //! section's states; the half-width zero and the threshold zero are the linear terms and never move.
 
+use super::group::Group;
 use super::hysteresis::Elements;
 use super::movement::{Path, scored};
 use super::point::{Freedom, Point};
-use super::table::{Group, Table};
+use super::table::Table;
 use crate::Record;
 use crate::effects::Block;
 use crate::linear::LARGEST_POLE;

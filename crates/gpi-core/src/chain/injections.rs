@@ -37,10 +37,11 @@
 
 use super::around_loops::AroundLoops;
 use super::between::Between;
+use super::group::Group;
 use super::loops::loops_of;
 use super::point::Point;
 use super::sensitivity::{Columns, Derivatives};
-use super::table::{Group, Table};
+use super::table::Table;
 use crate::Matrix;
 use crate::effects::{InnerLoop, Law, Place};
 use crate::linear::Section;

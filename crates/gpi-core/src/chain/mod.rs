@@ -23,7 +23,7 @@
 //! Griewank and A. Walther, *Evaluating Derivatives*, 2008). The tangent and the adjoint of a place stand beside its
 //! value. [`forward`] records what both need, and [`stream`] drives all three through an experiment, block by block.
 //!
-//! The unknowns are the rows of one [`table`], from which values, steps, [`bounds`], [`names`] and injections follow.
+//! The unknowns are the rows of one [`table`] of [groups](group), from which values, steps, [`bounds`], [`names`] and injections follow.
 //!
 //! # Symbols
 //!
@@ -65,6 +65,7 @@ mod dahl;
 mod effect_columns;
 mod forward;
 pub(crate) mod free_run;
+pub(crate) mod group;
 pub(crate) mod hysteresis;
 pub(crate) mod injections;
 mod jet;

@@ -5,8 +5,9 @@
 //! `knots o + m`. Sections in parallel with G are numbered behind those of G, in the order of the chain. Thresholds are
 //! numbered by their rank, because the point puts the threshold 0 first and the model sorts them.
 
+use super::group::Group;
 use super::point::Point;
-use super::table::{Group, Table};
+use super::table::Table;
 use crate::Record;
 use crate::effects::Units;
 

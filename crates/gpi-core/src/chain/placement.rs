@@ -7,8 +7,9 @@
 //! next fit.
 
 use super::bounds::range;
+use super::group::Group;
 use super::point::Point;
-use super::table::{Group, Table};
+use super::table::Table;
 use crate::Record;
 
 impl Point {

@@ -24,9 +24,10 @@
 //! Source: G. Pillonetto, F. Dinuzzo, T. Chen, G. De Nicolao, L. Ljung, *Kernel methods in system identification, machine learning and function
 //! estimation: a survey*, Automatica 50, 2014.
 
+use super::group::Group;
 use super::hysteresis::Prior;
 use super::point::Point;
-use super::table::{Group, Table};
+use super::table::Table;
 use crate::Matrix;
 use crate::linear::Arrow;
 use nalgebra::DVector;

@@ -77,9 +77,10 @@ impl Slope {
 
 #[cfg(test)]
 mod tests {
+    use crate::chain::group::Group;
     use crate::chain::plain::{FREE, plain};
     use crate::chain::stream::Stream;
-    use crate::chain::table::{Group, Table};
+    use crate::chain::table::Table;
     use crate::effects::Backlash;
     use crate::{Channel, Experiment, Matrix, Record};
     use nalgebra::DVector;

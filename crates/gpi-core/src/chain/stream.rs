@@ -6,10 +6,11 @@
 //! from the last to the first.
 
 use super::forward::{Forward, hats};
+use super::group::Group;
 use super::injections::Signals;
 use super::point::Point;
 use super::sensitivity::Derivatives;
-use super::table::{Group, Table};
+use super::table::Table;
 use super::tangents::{Tangents, Trace};
 use crate::{Error, Experiment, Matrix};
 use std::ops::Range;

@@ -31,11 +31,12 @@
 //! States below [`FADED`] are set to zero at the end of a block.
 
 use super::between::{Between, Row};
+use super::group::Group;
 use super::injections::{Places, Signals, injections};
 use super::lanes::{LANES, NONE, Weights, add};
 use super::motion::{advance_tangent, columns, rows};
 use super::point::Point;
-use super::table::{Group, Table};
+use super::table::Table;
 use super::tiles::{Entry, Shape, Tile, tiles};
 use crate::effects::{InnerLoop, OutputStage, Sees, Slope};
 use crate::linear::Section;

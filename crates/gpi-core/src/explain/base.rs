@@ -23,8 +23,9 @@
 
 use super::policy::score::RANK;
 use crate::chain::free_run::Signals;
+use crate::chain::group::Group;
 use crate::chain::point::{Freedom, Point};
-use crate::chain::table::{Group, Table};
+use crate::chain::table::Table;
 use crate::effects::Situation;
 use crate::fit::problem::Estimation;
 use crate::optimize::{LeastSquares, Linearization, Loss};

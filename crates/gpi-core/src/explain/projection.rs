@@ -25,8 +25,8 @@
 
 use super::base::Base;
 use crate::chain::free_run::Signals;
+use crate::chain::group::Group;
 use crate::chain::stream::{Rows, Stream};
-use crate::chain::table::Group;
 use crate::effects::{Effect, Proposal};
 use crate::fit::gather::{gather, whitened};
 use crate::fit::problem::Estimation;

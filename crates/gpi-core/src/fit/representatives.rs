@@ -14,8 +14,9 @@
 //! Derivatives of a part begin `ln(0.01) / ln|p|` samples before it, p the slowest pole: earlier inputs act on it by less
 //! than one percent.
 
+use crate::chain::group::Group;
 use crate::chain::point::Point;
-use crate::chain::table::{Group, Table};
+use crate::chain::table::Table;
 use crate::fit::settings::RepresentativeSettings;
 use crate::linear::Section;
 use crate::{Error, Experiment, Matrix, Record};

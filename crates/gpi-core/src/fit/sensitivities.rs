@@ -1,9 +1,10 @@
 //! The derivatives that a refinement uses, for experiment design, other optimizers and checks.
 
+use crate::chain::group::Group;
 use crate::chain::hysteresis::Parameters;
 use crate::chain::point::Point;
 use crate::chain::stream::Stream;
-use crate::chain::table::{Group, Table};
+use crate::chain::table::Table;
 use crate::fit::joint::fit_options;
 use crate::fit::preparation::{Prepared, require_match};
 use crate::fit::problem::Estimation;

@@ -16,6 +16,7 @@
 //! The rate of false alarms is bounded by the sum over all tests, which each have the same probability. The windows double in
 //! length, so that a block needs two tests for each quantity on average.
 
+mod change;
 mod drawn;
 mod history;
 mod lines;
@@ -24,6 +25,7 @@ mod settings;
 mod tracks;
 mod watch;
 
+pub use change::Change;
 pub use moved::Watched;
 
 use crate::operators::{Limits, POSSIBLE};
@@ -35,26 +37,6 @@ use settings::MonitorSettings;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use tracks::Tracks;
 use watch::{Found, Watch};
-
-/// What has changed, by how much, and since when.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Change {
-    /// What has changed.
-    pub watched: Watched,
-    /// Number of the output in whose residual it is seen.
-    pub output: usize,
-    /// Offset and line: in the output's unit (a line's amplitude). Resonance: in Hz. All others: as a part of the former
-    /// value.
-    pub size: f64,
-    /// The standard deviation of `size`, from the noise alone; `None` where it is not known.
-    pub std: Option<f64>,
-    /// Seconds of data before the change began, to the precision of the windows that show it.
-    pub since: f64,
-    /// The probability that this quantity has changed, and not another one in its place.
-    pub confidence: f64,
-    /// Other quantities that may have changed in its place, each with a probability of at least 0.05.
-    pub instead: Vec<Watched>,
-}
 
 /// Monitors a machine with a model of it.
 ///
@@ -369,36 +351,16 @@ impl Monitor {
                 let is_of_line =
                     own.watched == Watched::Noise && (1.0 + own.size).powi(2) - 1.0 <= 2.0 * power;
                 if !is_of_line {
-                    changes.push(self.change(output, own));
+                    let since = own.onset as f64 * seconds;
+                    changes.push(Change::of(own, output, since));
                 }
             }
-            changes.extend(line.map(|line| Change {
-                watched: Watched::Line { frequency: line.frequency * self.model.rate() },
-                output,
-                size: line.amplitude,
-                std: None,
-                since: (lines.first.unwrap_or(line.onset) * self.settings.frame) as f64 * seconds,
-                confidence: 1.0,
-                instead: Vec::new(),
+            changes.extend(line.map(|line| {
+                let onset = lines.first.unwrap_or(line.onset) * self.settings.frame;
+                Change::of_line(line, output, self.model.rate(), onset as f64 * seconds)
             }));
         }
         changes
-    }
-
-    fn change(&self, output: usize, found: Found) -> Change {
-        let scale = match found.watched {
-            Watched::Resonance { frequency } => frequency,
-            _ => 1.0,
-        };
-        Change {
-            size: scale * found.size,
-            std: Some(scale * found.std).filter(|std| std.is_finite()),
-            since: (found.onset * self.block) as f64 / self.model.rate(),
-            confidence: found.confidence,
-            watched: found.watched,
-            instead: found.instead,
-            output,
-        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod effects;
 mod identification;
+mod on_record;
 mod refinement;
 mod state;
 
@@ -13,7 +14,7 @@ use crate::arrays::{from_matrix, from_signal, from_vector, signal, vector};
 use crate::calls;
 use crate::channels::{label, names, units};
 use crate::compensate::{self, Compensation, Compensator};
-use crate::errors::{parameter, to_python};
+use crate::errors::to_python;
 use crate::figures::figures;
 use crate::linear::StateSpace;
 use crate::operators::Gpi;
@@ -21,12 +22,10 @@ use crate::plotting::in_notebook;
 use crate::progress::interruptible;
 use crate::record::Record;
 use gpi_core::compensate::CompensateOptions;
-use gpi_core::identify::{
-    functions_of_time, on_another_record, over_horizons, residuals_from_fitted_start,
-};
-use gpi_core::{LoopStep, Matrix, SimulationError};
+use gpi_core::identify::{functions_of_time, on_another_record, over_horizons};
+use gpi_core::{Matrix, SimulationError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::PyDict;
 
 /// A Hammerstein model: ``y = G(q) P[D[u]] + offset``, one hysteresis per input.
 ///
@@ -46,32 +45,6 @@ pub(crate) struct Model {
     pub(crate) model: gpi_core::Model,
     pub(crate) identification: Option<Py<Identification>>,
     pub(crate) refinement: Option<Py<Refinement>>,
-}
-
-impl Model {
-    fn residuals(&self, py: Python<'_>, record: &Record, fit_start: bool) -> PyResult<Vec<Matrix>> {
-        let (model, record) = (&self.model, &record.record);
-        if fit_start {
-            interruptible(py, None, |report| residuals_from_fitted_start(model, record, report))
-        } else {
-            model.residuals(record).map_err(to_python)
-        }
-    }
-
-    /// The outputs of all experiments of a record, with its own measured columns.
-    fn simulate_record<'py>(
-        &self,
-        py: Python<'py>,
-        record: &Record,
-        has_covariates: bool,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        if has_covariates {
-            return Err(parameter("`covariates`: a record has its own; leave them out".to_owned()));
-        }
-        let simulated = self.model.simulate_record(&record.record).map_err(to_python)?;
-        let outputs = simulated.iter().map(|output| from_matrix(py, output));
-        Ok(PyList::new(py, outputs)?.into_any())
-    }
 }
 
 #[pymethods]
@@ -333,16 +306,7 @@ impl Model {
     #[doc = include_str!("../docs/model/loop_steps.txt")]
     fn loop_steps<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let steps = self.model.loop_steps().map_err(to_python)?;
-        let written = |step: LoopStep| {
-            let fields = PyDict::new(py);
-            fields.set_item("states", from_vector(py, &step.states))?;
-            fields.set_item("inputs", from_vector(py, &step.inputs))?;
-            fields.set_item("next", from_vector(py, &step.next))?;
-            fields.set_item("earlier", from_vector(py, &step.earlier))?;
-            fields.set_item("drives", from_vector(py, &step.drives))?;
-            Ok(fields)
-        };
-        steps.into_iter().map(written).collect()
+        steps.iter().map(|step| state::write_loop_step(py, step)).collect()
     }
 
     #[doc = include_str!("../docs/model/to_json.txt")]

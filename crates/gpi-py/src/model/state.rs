@@ -1,10 +1,12 @@
 //! The state of a model as one vector.
 
+use crate::arrays::from_vector;
 use crate::errors::parameter;
 use crate::operators::{read_state, write_state};
-use gpi_core::{Model, ModelState};
+use gpi_core::{LoopStep, Model, ModelState};
 use nalgebra::DVector;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// The previous input and the play outputs of every input, then the states of G. If there are effects: the memory of each,
 /// preceded by its length, and the number of past samples.
@@ -17,6 +19,20 @@ pub(super) fn write(state: &ModelState) -> Vec<f64> {
     let sized = |memory: &Vec<f64>| [&[memory.len() as f64], &memory[..]].concat();
     let effects = state.effects.iter().flat_map(sized);
     values.chain(effects).chain(std::iter::once(state.sample as f64)).collect()
+}
+
+/// What a loop does in one of its steps, as vectors by name.
+pub(super) fn write_loop_step<'py>(
+    py: Python<'py>,
+    step: &LoopStep,
+) -> PyResult<Bound<'py, PyDict>> {
+    let fields = PyDict::new(py);
+    fields.set_item("states", from_vector(py, &step.states))?;
+    fields.set_item("inputs", from_vector(py, &step.inputs))?;
+    fields.set_item("next", from_vector(py, &step.next))?;
+    fields.set_item("earlier", from_vector(py, &step.earlier))?;
+    fields.set_item("drives", from_vector(py, &step.drives))?;
+    Ok(fields)
 }
 
 /// The inverse of [`write`].

@@ -14,8 +14,9 @@
 
 use super::contribution::contribution;
 use crate::chain::free_run::Signals;
+use crate::chain::group::Group;
 use crate::chain::point::Point;
-use crate::chain::table::{Group, Table};
+use crate::chain::table::Table;
 use crate::effects::Stage;
 use crate::explain::base::Base;
 use crate::explain::policy::ExaminationPolicy;
