@@ -81,13 +81,18 @@ fn outstanding(situation: &Situation, output: usize) -> Vec<f64> {
     const AROUND: usize = 50;
     /// Power over the median around it from which a line stands out: among a million lines of white noise the largest ratio is 20.
     const OUTSTANDING: f64 = 30.0;
+    /// Power of a line of the residual over that of the measured output there, at most. By hand: half of the amplitude. A line that the
+    /// measured output does not have is one of the model.
+    const SHOWN: f64 = 4.0;
     let longest = (0..situation.residuals.len()).max_by_key(|&i| situation.residuals[i].nrows());
     let Some(place) = longest else { return Vec::new() };
     let residual = behind_warmup(situation, place, &situation.residuals[place], output);
     let n = residual.len();
     let power = power(&residual);
     let driven = driven(situation, place, output);
-    let is_driven = |line: usize| driven[line] > power[line];
+    let measured = measured(situation, place, output);
+    let is_driven =
+        |line: usize| driven[line] > power[line] || power[line] > SHOWN * measured[line];
     let (mut best, mut strongest): (Option<(f64, usize)>, Option<usize>) = (None, None);
     let mut first = FEWEST_PERIODS;
     // the median of a piece estimates its background
@@ -162,6 +167,11 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
         }
     }
     most
+}
+
+/// The power of the measured output at each line.
+fn measured(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
+    power(&behind_warmup(situation, experiment, &situation.record.experiments()[experiment].output, output))
 }
 
 /// A column of a signal of an experiment without its warm-up, in which the unknown initial state may leave a large residual.
@@ -266,11 +276,12 @@ mod tests {
 
     /// The same behind a warm-up of so many samples, in which an unknown initial state leaves a residual as large as the displacement.
     fn proposed_behind(warmup: usize, lines: Sines) -> Vec<f64> {
-        proposed_of(&[(3.0, 1.0), (7.0, 0.4), (31.0, 0.1)], warmup, lines)
+        proposed_of(&[(3.0, 1.0), (7.0, 0.4), (31.0, 0.1)], warmup, lines, 1.0)
     }
 
-    /// The same for a displacement of other sines, which is the drive, too.
-    fn proposed_of(displaced: Sines, warmup: usize, lines: Sines) -> Vec<f64> {
+    /// The same for a displacement of other sines, which is the drive, too. Of the residual, the measured output has a part; the rest is
+    /// an error of the simulated one.
+    fn proposed_of(displaced: Sines, warmup: usize, lines: Sines, measured: f64) -> Vec<f64> {
         let (rate, n) = (200.0, 6000);
         let time = |k: usize| k as f64 / rate;
         let mut random = 11.0;
@@ -293,7 +304,8 @@ mod tests {
         let start = |k: usize| if k < warmup { (0.9 * k as f64).sin() } else { 0.0 };
         let residuals = [Matrix::from_fn(n, 1, |k, _| sum(k) + 0.02 * noise() + start(k))];
         let channel = |name| vec![Channel::new(name, "")];
-        let run = vec![Experiment { warmup, ..Experiment::new(u.clone(), u.clone()) }];
+        let output = &u + measured * &residuals[0];
+        let run = vec![Experiment { warmup, ..Experiment::new(u.clone(), output) }];
         let record = Record::new(run, rate, channel("u"), channel("y"), vec![]).unwrap();
         let signals = [u];
         let found = PeriodicDisturbance::proposals(&Situation {
@@ -326,11 +338,22 @@ mod tests {
         let harmonics: Vec<(f64, f64)> =
             (17..26).map(|n| (3.0 * f64::from(n), 0.05 / (1.0 + f64::from(n % 4)))).collect();
         let beside = |frequency: f64| (frequency / 3.0 - (frequency / 3.0).round()).abs() * 3.0;
-        let found = proposed_of(&[(3.0, 1.0)], 0, &harmonics);
+        let found = proposed_of(&[(3.0, 1.0)], 0, &harmonics, 1.0);
         assert!(found.iter().all(|&frequency| beside(frequency) > 0.15), "{found:?}");
         // the same line without its neighbours
-        let found = proposed_of(&[(3.0, 1.0)], 0, &[(60.0, 0.05)]);
+        let found = proposed_of(&[(3.0, 1.0)], 0, &[(60.0, 0.05)], 1.0);
         assert!((found[0] - 60.0).abs() < 0.01, "{found:?}");
+    }
+
+    #[test]
+    fn a_line_that_was_not_measured_is_no_disturbance() {
+        let found = |measured: f64| {
+            proposed_of(&[(3.0, 1.0), (7.0, 0.4)], 0, &[(41.3, 0.1)], measured)
+                .iter()
+                .any(|frequency| (frequency - 41.3).abs() < 0.05)
+        };
+        assert!(found(1.0));
+        assert!(!found(0.1));
     }
 
     #[test]

@@ -91,6 +91,9 @@ settings! {
         around: usize = 12, FROM_ONE;
         /// Of them, samples that may be wrong as well where outliers are counted. By hand.
         near: usize = 2, 0.0..=24.0;
+        /// Part of such a difference by which the measured output must differ from the cubic through its four neighbours: by hand, as
+        /// the motion may hide a part of it.
+        shown: f64 = 0.5, PART;
     }
 }
 
