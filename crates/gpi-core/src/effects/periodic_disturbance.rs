@@ -130,7 +130,8 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
     /// The n-th harmonic of an error of the model over the largest of the four harmonics around it, at most. By hand: a resonance
     /// amplifies it by as much.
     const AMPLIFIED: f64 = 10.0;
-    /// Lines between harmonics from which a disturbance at one of them does not reach the next.
+    /// Least distance of the harmonics in lines for this comparison. By hand: nearer together, the peak of a disturbance at one of them
+    /// would be counted as an error at the next.
     const APART: f64 = 20.0;
     /// Smallest part of the input's power in its strongest line.
     const MOST: f64 = 0.9;
