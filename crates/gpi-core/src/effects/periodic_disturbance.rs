@@ -72,15 +72,18 @@ impl PeriodicDisturbance {
     }
 }
 
+/// Lines on either side whose median is the background of a line.
+const AROUND: usize = 50;
+
+/// Power over the background from which a line stands out: among a million lines of white noise the largest ratio is 20.
+const OUTSTANDING: f64 = 30.0;
+
 /// The frequencies of the residual's line with the largest ratio of its power to the median around it, and of the line with the largest
 /// power of those that stand out, interpolated between the lines of a Hann window. A harmonic may stand out more than the fundamental,
 /// where the error of the model is smaller.
 fn outstanding(situation: &Situation, output: usize) -> Vec<f64> {
     /// A line of fewer periods cannot be told from drift.
     const FEWEST_PERIODS: usize = 20;
-    const AROUND: usize = 50;
-    /// Power over the median around it from which a line stands out: among a million lines of white noise the largest ratio is 20.
-    const OUTSTANDING: f64 = 30.0;
     /// Power of a line of the residual over that of the measured output there, at most. By hand: half of the amplitude. A line that the
     /// measured output does not have is one of the model.
     const SHOWN: f64 = 4.0;
@@ -98,9 +101,7 @@ fn outstanding(situation: &Situation, output: usize) -> Vec<f64> {
     // the median of a piece estimates its background
     while first + AROUND < power.len() {
         let last = (first + 2 * AROUND).min(power.len());
-        let mut piece = power[first..last].to_vec();
-        piece.sort_by(f64::total_cmp);
-        let background = piece[piece.len() / 2].max(f64::MIN_POSITIVE);
+        let background = background(&power, (first + AROUND) as f64);
         for line in (first..last).filter(|&line| !is_driven(line)) {
             let ratio = power[line] / background;
             if best.is_none_or(|(most, _)| ratio > most) {
@@ -127,14 +128,10 @@ fn outstanding(situation: &Situation, output: usize) -> Vec<f64> {
 fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
     /// The n-th harmonic of an error of the model is at most this over n of the displacement's fundamental.
     const MISFIT: f64 = 0.02;
-    /// The n-th harmonic of an error of the model over the largest of the four harmonics around it, at most. By hand: a resonance
-    /// amplifies it by as much.
-    const AMPLIFIED: f64 = 10.0;
-    /// Least distance of the harmonics in lines for this comparison. By hand: nearer together, the peak of a disturbance at one of them
-    /// would be counted as an error at the next.
-    const APART: f64 = 20.0;
-    /// Smallest part of the input's power in its strongest line.
+    /// Smallest part of the input's power in its strongest line for this.
     const MOST: f64 = 0.9;
+    /// The same for a comparison of harmonics with each other. By hand: of an input of several parts, one may be a sine.
+    const HALF: f64 = 0.5;
     /// The error of the model over the displacement at a line, over the same for the whole signals, at most. By hand: an error
     /// may be larger at one line than on average.
     const CONCENTRATED: f64 = 3.0;
@@ -146,28 +143,79 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
     let ratio = CONCENTRATED * (variance(&residual) / variance(&displacement)).sqrt();
     let displacement = power(&displacement);
     let count = displacement.len();
-    let largest = |place: f64| displacement[near(place, count)].iter().copied().fold(0.0, f64::max);
     let part = ratio.clamp(0.0, 1.0).powi(2);
-    let mut most: Vec<f64> = (0..count).map(|line| part * largest(line as f64)).collect();
-    if situation.drives[experiment].ncols() == 1
-        && let Some(line) = Strongest::of(&power(&of(situation.drives, 0)))
-        && line.part > MOST
-    {
-        let fundamental = largest(line.place);
-        let errors = power(&residual);
-        let error = |n: usize| errors[near(n as f64 * line.place, count)].iter().copied().fold(0.0, f64::max);
+    let mut most: Vec<f64> =
+        (0..count).map(|line| part * largest(&displacement, line as f64)).collect();
+    let strongest = (situation.drives[experiment].ncols() == 1)
+        .then(|| Strongest::of(&power(&of(situation.drives, 0))))
+        .flatten();
+    let Some(line) = strongest else { return most };
+    let mut raise = |place: f64, error: f64| {
+        near(place, count).for_each(|line| most[line] = most[line].max(error));
+    };
+    if line.part > MOST {
+        let fundamental = largest(&displacement, line.place);
         for n in 1..=(count as f64 / line.place) as usize {
-            let around = [n.saturating_sub(2), n.saturating_sub(1), n + 1, n + 2];
-            let around = around.into_iter().filter(|&n| n > 1 && line.place > APART);
-            let around = around.map(error).fold(0.0, f64::max);
-            let misfit = fundamental * (MISFIT / n as f64).powi(2);
-            let misfit = misfit.max(AMPLIFIED.powi(2) * around);
-            for line in near(n as f64 * line.place, count) {
-                most[line] = most[line].max(misfit);
-            }
+            raise(n as f64 * line.place, fundamental * (MISFIT / n as f64).powi(2));
+        }
+    }
+    if line.part > HALF {
+        for (place, error) in among_harmonics(&power(&residual), line.place, residual.len()) {
+            raise(place, error);
         }
     }
     most
+}
+
+/// For each harmonic of a line at `fundamental` (in lines) of `samples` values: where it is in the spectrum of the model's error, and the
+/// power that it may have there because of the harmonics around it.
+///
+/// The harmonics of a sampled signal that lie above half of the sampling rate are found below it, too.
+fn among_harmonics(errors: &[f64], fundamental: f64, samples: usize) -> Vec<(f64, f64)> {
+    /// The n-th harmonic over the largest of the four harmonics around it, at most. By hand: a resonance amplifies it by as much.
+    const AMPLIFIED: f64 = 10.0;
+    /// Least distance of the harmonics in lines. By hand: nearer together, the peak of a disturbance at one of them would be
+    /// counted as an error at the next.
+    const APART: f64 = 20.0;
+    /// The highest harmonic, over half of the sampling rate. By hand: the harmonics of the kinks at which plays turn fall with the square of
+    /// their number, and are weak beyond.
+    const HIGHEST: f64 = 4.0;
+    let count = errors.len() as f64;
+    // harmonics of twice the number are half as far apart
+    let highest = HIGHEST.min(fundamental / APART);
+    let place = |n: usize| {
+        let place = (n as f64 * fundamental).rem_euclid(samples as f64);
+        place.min(samples as f64 - place)
+    };
+    let is_fundamental = |n: usize| near(fundamental, errors.len()).contains(&(place(n).round() as usize));
+    // one that does not stand out is the noise
+    let standing = |n: usize| {
+        let power = largest(errors, place(n));
+        if power > OUTSTANDING * background(errors, place(n)) { power } else { 0.0 }
+    };
+    let last = (highest * count / fundamental) as usize;
+    let errors: Vec<f64> = (0..=last + 2)
+        .map(|n| if n < 2 || is_fundamental(n) { 0.0 } else { standing(n) })
+        .collect();
+    let around = |n: usize| {
+        let around = [n.saturating_sub(2), n.saturating_sub(1), n + 1, n + 2];
+        around.into_iter().map(|n| errors[n]).fold(0.0, f64::max)
+    };
+    (1..=last).map(|n| (place(n), AMPLIFIED.powi(2) * around(n))).collect()
+}
+
+/// The largest power of the lines that belong to the peak at a place.
+fn largest(power: &[f64], place: f64) -> f64 {
+    power[near(place, power.len())].iter().copied().fold(0.0, f64::max)
+}
+
+/// The median of the power around a place.
+fn background(power: &[f64], place: f64) -> f64 {
+    let line = place.round() as usize;
+    let mut around =
+        power[line.saturating_sub(AROUND).min(power.len())..(line + AROUND).min(power.len())].to_vec();
+    around.sort_by(f64::total_cmp);
+    around.get(around.len() / 2).map_or(f64::INFINITY, |&median| median.max(f64::MIN_POSITIVE))
 }
 
 /// The power of the measured output at each line.
@@ -341,6 +389,14 @@ mod tests {
         let beside = |frequency: f64| (frequency / 3.0 - (frequency / 3.0).round()).abs() * 3.0;
         let found = proposed_of(&[(3.0, 1.0)], 0, &harmonics, 1.0);
         assert!(found.iter().all(|&frequency| beside(frequency) > 0.15), "{found:?}");
+        // harmonics above half of the sampling rate, 200 Hz, and one of the same places alone
+        let folded: Vec<(f64, f64)> =
+            (34..46).map(|n| ((3.01 * f64::from(n) - 200.0).abs(), 0.05)).collect();
+        let among = |frequency: f64| folded.iter().any(|(own, _)| (own - frequency).abs() < 0.15);
+        let found = proposed_of(&[(3.01, 1.0)], 0, &folded, 1.0);
+        assert!(found.iter().all(|&frequency| !among(frequency)), "{found:?}");
+        let found = proposed_of(&[(3.01, 1.0)], 0, &folded[3..4], 1.0);
+        assert!((found[0] - folded[3].0).abs() < 0.01, "{found:?}");
         // the same line without its neighbours
         let found = proposed_of(&[(3.0, 1.0)], 0, &[(60.0, 0.05)], 1.0);
         assert!((found[0] - 60.0).abs() < 0.01, "{found:?}");

@@ -2,8 +2,9 @@
 //!
 //! Of the accepted trials ([`super::judgement`]) the one with the largest deviance beyond its threshold is taken. Trials whose deviance lies
 //! within that threshold of its own explain the same: of these, one with plausible parameters is preferred, more of a driven
-//! effect that the model has already to a new name, of functions of time one that is added to the output and gains nearly the same,
-//! and the others are reported as confounded.
+//! effect that the model has already to a new name, an effect with a law of its own to an expansion in many terms, which takes the form
+//! of many effects, of functions of time one that is added to the output and gains nearly the same, and the others are reported as
+//! confounded.
 
 use super::judgement::{Evidence, judge};
 use super::policy::JudgementPolicy;
@@ -36,6 +37,8 @@ pub(super) fn choose(
     // no new name where more of what is there explains the same
     let is_no_new_name = |trial: &Evidence| trial.is_more && is_as_good(trial);
     let instead = instead.or_else(|| trials.iter().position(is_no_new_name));
+    let has_law = |trial: &Evidence| trial.has_law && is_as_good(trial);
+    let instead = instead.or_else(|| trials.iter().position(has_law));
     Some(instead.or_else(|| trials.iter().position(is_as_good)).unwrap_or(best))
 }
 
@@ -90,6 +93,9 @@ mod tests {
         assert_eq!(refusal(&doubted, None, &policy), Refusal::NotItsOwn);
         let decay = Evidence { is_driven: false, ..equal };
         assert_eq!(refusal(&decay, Some(&best), &policy), Refusal::Undriven);
+        let expansion = Evidence { has_law: false, ..sound() };
+        assert_eq!(choose(&[expansion, equal], 1.05, &policy), Some(1));
+        assert_eq!(choose(&[expansion, weaker], 1.05, &policy), Some(0));
         let more = Evidence { is_more: true, ..equal };
         assert_eq!(choose(&[sound(), equal, more], 1.05, &policy), Some(2));
         assert_eq!(

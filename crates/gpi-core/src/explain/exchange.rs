@@ -15,7 +15,7 @@
 //!
 //! | rival | replaces the slow function where |
 //! |---|---|
-//! | a driven effect | `lost` < what the slow function must gain, `T_rival < f T`, plausible values, and what the slow function gained less `lost` is significant |
+//! | a driven effect with a law of its own | `lost` < what the slow function must gain, `T_rival < f T`, plausible values, and what the slow function gained less `lost` is significant |
 //! | another slow function with q more unknowns | `lost + q ln N < -2 ln L`, L the number of looks ([`super::judgement`]) |
 //!
 //! A driven rival that has replaced a slow function is an addition, after which other effects may be superfluous ([`super::revision`]).
@@ -42,8 +42,10 @@ use crate::progress::as_trial;
 pub(super) fn prefer_driven(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let mut is_replaced = false;
     let is_slow = |entry: &Entry| entry.signature == Signature::SlowInTime;
+    // an expansion in many terms is as flexible as the slow function
+    let is_rival = |own: &&Entry| own.driven && !is_slow(own) && !own.is_expansion;
     let driven: Vec<&'static Entry> =
-        state.setup.allowed.iter().copied().filter(|own| own.driven && !is_slow(own)).collect();
+        state.setup.allowed.iter().copied().filter(is_rival).collect();
     // from the end of the chain
     for slow in CATALOGUE.iter().rev().filter(|entry| is_slow(entry)) {
         let place = state.point.effects.iter().position(|effect| effect.name() == slow.name);

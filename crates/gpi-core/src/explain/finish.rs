@@ -1,21 +1,29 @@
 //! The last fit of a search, with everything free.
 
 use super::policy::FitPolicy;
+use super::search::drop_impossible;
 use super::state::SearchState;
 use crate::Error;
+use crate::effects::Entry;
 use crate::fit::RefineOptions;
 use crate::fit::joint::{Refined, fit_options};
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::identify::{Progress, Refinement};
 
-/// Refines everything once more, grids that were not given included, and estimates the parameters' uncertainty.
+/// Refines everything once more, grids that were not given included, and estimates the parameters' uncertainty. An effect that this fit
+/// makes impossible was none, unless it is required: the rest is then refined without it.
 pub(super) fn finish(
     state: &mut SearchState,
+    required: &[&'static Entry],
     interrupted: bool,
     progress: Progress,
 ) -> Result<Refinement, Error> {
-    let (fitted, options) = refined(state, interrupted, progress)?;
+    let (mut fitted, mut options) = refined(state, interrupted, progress)?;
     state.point = fitted.point.clone();
+    while !interrupted && drop_impossible(state, required, progress)? {
+        (fitted, options) = refined(state, interrupted, progress)?;
+        state.point = fitted.point.clone();
+    }
     state.repair()?;
     let refined = Refined { fitted, options, outliers: 0, robust: false };
     let refinement = refined.finish(&state.prepared, progress)?;

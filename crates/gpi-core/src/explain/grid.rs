@@ -49,11 +49,20 @@ impl Place {
 
 /// Moves half-widths and thresholds, and takes finer grids as long as they pay. Says whether the model became better.
 pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
-    let policy = &state.setup.policy.grid;
     state.is_rich = true;
     if !state.setup.moving.half_widths && !state.setup.moving.thresholds {
         return Ok(false);
     }
+    let is_finer = add_places(state, progress)?;
+    let is_other = choose_anew(state, progress)?;
+    // other plays leave another residual, which may ask for deadzones
+    let is_finer_again = is_other && add_places(state, progress)?;
+    Ok(is_finer || is_other || is_finer_again)
+}
+
+/// Adds plays and deadzones that the residual asks for as long as they pay, and moves all; says whether the model became better.
+fn add_places(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    let policy = &state.setup.policy.grid;
     let values = state.prepared.values();
     let mut gained = false;
     for round in 0..policy.rounds {
@@ -74,7 +83,7 @@ pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Resul
             break;
         }
     }
-    Ok(choose_anew(state, progress)? || gained)
+    Ok(gained)
 }
 
 /// Chooses the plays anew on a dense grid, where the model has effects and stays above the noise; says whether it became better.

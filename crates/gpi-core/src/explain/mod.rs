@@ -209,7 +209,7 @@ fn explain_once(
         interrupted =
             is_interrupted(coloured::search_weighed(&mut state, &weighed, &mut progress))?;
     }
-    for entry in required {
+    for &entry in &required {
         if !interrupted {
             let forced = search::force(&mut state, entry, &mut progress);
             interrupted = is_interrupted(forced)?;
@@ -219,7 +219,7 @@ fn explain_once(
     overall.part(1.0, steps.last * steps.light);
     let mut progress = |report: &Report| overall.take(report);
     let last: Progress = if interrupted { &mut patient } else { &mut progress };
-    let refinement = finish(&mut state, interrupted, last)?;
+    let refinement = finish(&mut state, &required, interrupted, last)?;
     // rules out that something in front of G is the only cause
     let has_loops = state.point.loops().next().is_some();
     let moved_resonance = if has_loops && !interrupted {

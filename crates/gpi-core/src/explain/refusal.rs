@@ -11,6 +11,8 @@ pub(super) enum Refusal {
     Unconfirmed,
     /// Far from the noise, too small a part of the residual.
     Insubstantial,
+    /// An expansion in many terms, where the residual is hardly above the noise.
+    FewPlays,
     /// No machine has such values.
     Impossible,
     /// A mode that follows a line, creep or a disturbance.
@@ -60,6 +62,9 @@ impl Refusal {
             Self::Unconfirmed => "is not confirmed by the held-out blocks".to_owned(),
             Self::Insubstantial => {
                 "removes only a small part of a residual that is far above the noise".to_owned()
+            }
+            Self::FewPlays => {
+                "has many terms, and the error of the model is so close to the noise that they may represent the misfit of a finite number of plays".to_owned()
             }
             Self::Impossible => "would need parameter values that no real machine has".to_owned(),
             Self::NotAMode => {

@@ -263,6 +263,10 @@ fn evidence<'a>(
         balanced.map_or(of_output, |own| (own.squares, [&own.held_out[0][..], &own.held_out[1]]));
     let is_asked = balanced.is_none() && trial.deviance > trial.threshold;
     let change = is_asked.then(|| state.held_out_change(&state.point, &trial.point)).transpose()?;
+    // the many terms of an expansion follow what a finite number of plays leaves
+    let is_misfit =
+        trial.entry.is_expansion && state.cost <= state.setup.policy.grid.at_noise * noise;
+    let unconfirmed = (balanced.is_some() && is_worse).then_some(Refusal::Unconfirmed);
     Ok(Evidence {
         deviance: if balanced.is_some() {
             state.prepared.values() * (squares[0] / squares[1]).ln()
@@ -284,8 +288,9 @@ fn evidence<'a>(
         is_measured: trial.entry.driven && trial.entry.stage == Stage::Added,
         is_slow: trial.entry.signature == Signature::SlowInTime,
         is_added: trial.entry.stage == Stage::Added,
+        has_law: !trial.entry.is_expansion,
         is_integrated: balanced.is_none() && state.integrates()?,
-        doubt: (balanced.is_some() && is_worse).then_some(Refusal::Unconfirmed),
+        doubt: unconfirmed.or(is_misfit.then_some(Refusal::FewPlays)),
     })
 }
 

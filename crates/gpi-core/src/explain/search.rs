@@ -1,7 +1,7 @@
 //! The closed loop: rounds that add effects ([`super::round`]), until nothing more is confirmed and all that was named passes the last
 //! examination.
 
-use super::examination::doubt;
+use super::examination::{doubt, impossible};
 use super::exchange::{exchange_slow, prefer_driven};
 use super::force_at_input::enter_with_input;
 use super::pairs::add_pair;
@@ -63,22 +63,54 @@ fn examine_all(state: &mut SearchState, progress: Progress) -> Result<bool, Erro
             passed = 0;
             continue;
         }
-        let entry = state.point.effects[place].entry();
-        let [_, holdout_rms] = state.rms(&state.point)?;
-        state.surpassing.note(entry, why, holdout_rms);
-        state.remove(place, progress)?;
-        let why = why.in_words("the model");
-        let (effect, confounded_with) = (entry.name, Vec::new());
-        let probability = None;
-        state.refused.push(Rejected { effect, holdout_rms, why, confounded_with, probability });
-        if !state.has(entry) {
-            state.additions.retain(|one| one.trial.entry.name != effect);
-        }
-        state.repair()?;
+        refuse(state, place, why, progress)?;
         // the others may have depended on it
         passed = 0;
     }
     Ok(state.refused.len() > before)
+}
+
+/// Drops the first effect that the last fit has made impossible, or its implausible terms; says whether there was any. Those that the
+/// user requires stay.
+pub(super) fn drop_impossible(
+    state: &mut SearchState,
+    required: &[&'static Entry],
+    progress: Progress,
+) -> Result<bool, Error> {
+    for place in 0..state.point.effects.len() {
+        let name = state.point.effects[place].name();
+        if required.iter().any(|entry| entry.name == name) {
+            continue;
+        }
+        if let Some(why) = impossible(state, &state.point, place)? {
+            if !keep_plausible(state, place, progress)? {
+                refuse(state, place, why, progress)?;
+            }
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Drops an effect for a reason. It is not tried again.
+fn refuse(
+    state: &mut SearchState,
+    place: usize,
+    why: Refusal,
+    progress: Progress,
+) -> Result<(), Error> {
+    let entry = state.point.effects[place].entry();
+    let [_, holdout_rms] = state.rms(&state.point)?;
+    state.surpassing.note(entry, why, holdout_rms);
+    state.remove(place, progress)?;
+    let why = why.in_words("the model");
+    let (effect, confounded_with) = (entry.name, Vec::new());
+    let probability = None;
+    state.refused.push(Rejected { effect, holdout_rms, why, confounded_with, probability });
+    if !state.has(entry) {
+        state.additions.retain(|one| one.trial.entry.name != effect);
+    }
+    state.repair()
 }
 
 /// The places of all effects, those of slow functions of time first.

@@ -190,7 +190,11 @@ fn is_mode(state: &SearchState, trial: &Trial) -> Result<bool, Error> {
 }
 
 /// Why no machine can have the effect at a place, if so.
-fn impossible(state: &SearchState, point: &Point, place: usize) -> Result<Option<Refusal>, Error> {
+pub(super) fn impossible(
+    state: &SearchState,
+    point: &Point,
+    place: usize,
+) -> Result<Option<Refusal>, Error> {
     let effect = &point.effects[place];
     if let Place::Loops(closed) = effect.place() {
         let most = state.setup.policy.examination.excess;

@@ -33,7 +33,8 @@ settings! {
         rounds: usize = 6, FROM_ONE;
         /// A round that lowers the squares by less than this part is the last: another one would gain less.
         small: f64 = 0.02, PART;
-        /// Squares over those of the noise up to which plays are not chosen anew on a dense grid: 5 % of the error. By hand.
+        /// Squares over those of the noise up to which plays are not chosen anew on a dense grid, and an expansion in many terms is not
+        /// named, which may follow what the plays leave: 5 % of the error. By hand.
         at_noise: f64 = 1.1, FROM_ONE;
         /// Plays and deadzones that are added at once, before they are refined together. By hand.
         at_once: usize = 8, FROM_ONE;
