@@ -51,8 +51,8 @@ def test_the_last_fit_leaves_no_creep_that_relaxes_backwards():
     # one sine, whose flat parts are those of a gap: lags of both signs fit it best
     columns = {"input": "u_deg", "output": "y_deg", "resample": True, "covariate": []}
     answer = explained("tendon-sheath-backlash/conf90_60.csv", **columns)
-    steps = [step for step in answer["steps"] if step["effect"] == "creep"]
-    gains = [row["value"] for step in steps for row in step["parameters"] if row["name"].startswith("gain")]
+    steps = [step["parameters"] for step in answer["steps"] if step["effect"] == "creep"]
+    gains = [row["value"] for rows in steps for name, row in rows.items() if name.startswith("gain")]
     assert -sum(gain for gain in gains if gain < 0.0) <= 0.5 * sum(gains)
 
 
