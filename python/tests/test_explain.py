@@ -8,6 +8,7 @@ import scipy.signal
 
 import gpi_hammerstein as gpi
 import plants
+import scores
 from data_folder import DEV
 from gpi_hammerstein.explanation import in_words
 from records import actuator, drive
@@ -137,13 +138,6 @@ def test_a_fit_that_ends_far_above_the_noise_begins_again_at_another_law():
     assert found.after["holdout"]["rms"] < 1.1 * plant.noise_std
 
 
-def explained_piece(plant, number, first):
-    """Explain 30 s of a long record, from sample `first`: creep is older than the piece."""
-    run = plant.record(number)
-    piece = slice(first, first + 30_000)
-    return gpi.explain(gpi.Record(run.u[piece], run.y[piece], 1000.0))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "first", "lacking", "effects"),
@@ -159,23 +153,24 @@ def explained_piece(plant, number, first):
     ],
 )
 def test_a_piece_of_a_long_record_gets_no_false_name(number, first, lacking, effects):
-    plant = plants.draw(3, lacking, seconds=1000.0, rate=1000.0)
-    assert sorted(explained_piece(plant, number, first).effects) == effects
+    # the creep is older than the piece
+    run = plants.draw(3, lacking, seconds=1000.0, rate=1000.0).record(number)
+    found = gpi.explain(record_of(scores.cut(run, first, first + 30_000)))
+    assert sorted(found.effects) == effects
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("seed", "first", "lacking", "effects"),
+    ("seed", "lacking", "found"),
     [
         # a shape of the loops explains nearly as much as knots of the gain, with many more terms
-        (4012, 246_162, ("gain-drift", "amplifier-slew"), ["gain-drift"]),
+        (4012, ("gain-drift", "amplifier-slew"), ("gain-drift",)),
         # the harmonics of a sine that lie above half of the sampling rate return below it
-        (4037, 45_891, ("output-nonlinearity", "rate-dependence"), ["rate-dependence"]),
+        (4037, ("output-nonlinearity", "rate-dependence"), ("rate-dependence",)),
     ],
 )
-def test_many_terms_and_folded_harmonics_get_no_name(seed, first, lacking, effects):
-    plant = plants.draw(seed, lacking, None, 300.0, 1000.0, in_motion=False)
-    assert explained_piece(plant, 0, first).effects == effects
+def test_many_terms_and_folded_harmonics_get_no_name(seed, lacking, found):
+    assert scores.piece(seed, lacking, 30.0).found == found
 
 
 @pytest.mark.slow

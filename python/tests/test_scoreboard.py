@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import gpi_hammerstein as gpi
+import plants
 import score_tables
 import scoreboard
 import scores
@@ -205,3 +206,22 @@ def test_one_of_several_names_is_enough() -> None:
     assert answer("", 1.0).is_right()
     table = textbook_tables.by_stage([answer("friction creep"), answer("creep")])
     assert list(table.rows)[0][1:5] == ("creep, friction or hysteretic-stiffness", "1 of 2", "0", "1")
+
+
+def test_effects_that_a_piece_may_show_are_not_false() -> None:
+    def answer(found: str) -> Result:
+        return replace(result("", found), may=("creep", "backlash"))
+
+    answers = [answer("creep backlash"), answer("creep"), answer(""), answer("creep drift")]
+    assert list(score_tables.pieces(answers).rows) == [
+        ("a false effect is named", "1"),
+        ("every effect is named, and no other", "1"),
+    ]
+
+
+def test_a_piece_has_the_samples_of_all_columns() -> None:
+    run = plants.draw(3, ("covariate",), None, 2.0, 1000.0).record(0)
+    piece = scores.cut(run, 500, 800)
+    assert run.x is not None and piece.x is not None
+    for whole, part in ((run.t, piece.t), (run.u, piece.u), (run.y, piece.y), (run.x, piece.x)):
+        assert np.array_equal(part, whole[500:800])

@@ -127,8 +127,9 @@ impl Block for LinearDynamics {
                 Quantity::new("frequency", "Hz", natural / std::f64::consts::TAU),
                 Quantity::new("damping", "", damping),
             ],
-            Poles::Lags(times) => [0, 1]
-                .map(|i: usize| Quantity::new(format!("time_constant[{i}]"), "s", times[i])),
+            Poles::Lags(times) => {
+                [0, 1].map(|i: usize| Quantity::new(format!("time_constant[{i}]"), "s", times[i]))
+            }
         };
         let unit = Units::ratio(units.output, units.input);
         vec![first, second, Quantity::strength("static_gain", unit, gain)]

@@ -128,7 +128,7 @@ fn outstanding(situation: &Situation, output: usize) -> Vec<f64> {
 fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
     /// The n-th harmonic of an error of the model is at most this over n of the displacement's fundamental.
     const MISFIT: f64 = 0.02;
-    /// Smallest part of the input's power in its strongest line for this.
+    /// Smallest part of the input's power in its strongest line for this. By hand: a triangle has 0.986.
     const MOST: f64 = 0.9;
     /// The same for a comparison of harmonics with each other. By hand: of an input of several parts, one may be a sine.
     const HALF: f64 = 0.5;
@@ -170,7 +170,8 @@ fn driven(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
 /// For each harmonic of a line at `fundamental` (in lines) of `samples` values: where it is in the spectrum of the model's error, and the
 /// power that it may have there because of the harmonics around it.
 ///
-/// The harmonics of a sampled signal that lie above half of the sampling rate are found below it, too.
+/// The harmonics of a sampled signal that lie above half of the sampling rate are found below it, too: those up to h times this half
+/// are `fundamental / h` lines apart on average. There are none to compare where they are too near together.
 fn among_harmonics(errors: &[f64], fundamental: f64, samples: usize) -> Vec<(f64, f64)> {
     /// The n-th harmonic over the largest of the four harmonics around it, at most. By hand: a resonance amplifies it by as much.
     const AMPLIFIED: f64 = 10.0;
@@ -180,14 +181,17 @@ fn among_harmonics(errors: &[f64], fundamental: f64, samples: usize) -> Vec<(f64
     /// The highest harmonic, over half of the sampling rate. By hand: the harmonics of the kinks at which plays turn fall with the square of
     /// their number, and are weak beyond.
     const HIGHEST: f64 = 4.0;
+    if fundamental < APART {
+        return Vec::new();
+    }
     let count = errors.len() as f64;
-    // harmonics of twice the number are half as far apart
     let highest = HIGHEST.min(fundamental / APART);
     let place = |n: usize| {
         let place = (n as f64 * fundamental).rem_euclid(samples as f64);
         place.min(samples as f64 - place)
     };
-    let is_fundamental = |n: usize| near(fundamental, errors.len()).contains(&(place(n).round() as usize));
+    let is_fundamental =
+        |n: usize| near(fundamental, errors.len()).contains(&(place(n).round() as usize));
     // one that does not stand out is the noise
     let standing = |n: usize| {
         let power = largest(errors, place(n));
@@ -212,15 +216,21 @@ fn largest(power: &[f64], place: f64) -> f64 {
 /// The median of the power around a place.
 fn background(power: &[f64], place: f64) -> f64 {
     let line = place.round() as usize;
-    let mut around =
-        power[line.saturating_sub(AROUND).min(power.len())..(line + AROUND).min(power.len())].to_vec();
+    let mut around = power
+        [line.saturating_sub(AROUND).min(power.len())..(line + AROUND).min(power.len())]
+        .to_vec();
     around.sort_by(f64::total_cmp);
     around.get(around.len() / 2).map_or(f64::INFINITY, |&median| median.max(f64::MIN_POSITIVE))
 }
 
 /// The power of the measured output at each line.
 fn measured(situation: &Situation, experiment: usize, output: usize) -> Vec<f64> {
-    power(&behind_warmup(situation, experiment, &situation.record.experiments()[experiment].output, output))
+    power(&behind_warmup(
+        situation,
+        experiment,
+        &situation.record.experiments()[experiment].output,
+        output,
+    ))
 }
 
 /// A column of a signal of an experiment without its warm-up, in which the unknown initial state may leave a large residual.
@@ -397,6 +407,10 @@ mod tests {
         assert!(found.iter().all(|&frequency| !among(frequency)), "{found:?}");
         let found = proposed_of(&[(3.01, 1.0)], 0, &folded[3..4], 1.0);
         assert!((found[0] - folded[3].0).abs() < 0.01, "{found:?}");
+        // lines at harmonics that are too near together to be compared
+        let near: Vec<(f64, f64)> = (39..42).map(|n| (0.5 * f64::from(n), 0.05)).collect();
+        let found = proposed_of(&[(0.5, 1.0)], 0, &near, 1.0);
+        assert!(near.iter().any(|(own, _)| (found[0] - own).abs() < 0.05), "{found:?}");
         // the same line without its neighbours
         let found = proposed_of(&[(3.0, 1.0)], 0, &[(60.0, 0.05)], 1.0);
         assert!((found[0] - 60.0).abs() < 0.01, "{found:?}");

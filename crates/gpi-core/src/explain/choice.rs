@@ -37,7 +37,7 @@ pub(super) fn choose(
     // no new name where more of what is there explains the same
     let is_no_new_name = |trial: &Evidence| trial.is_more && is_as_good(trial);
     let instead = instead.or_else(|| trials.iter().position(is_no_new_name));
-    let has_law = |trial: &Evidence| trial.has_law && is_as_good(trial);
+    let has_law = |trial: &Evidence| !trial.is_expansion && is_as_good(trial);
     let instead = instead.or_else(|| trials.iter().position(has_law));
     Some(instead.or_else(|| trials.iter().position(is_as_good)).unwrap_or(best))
 }
@@ -93,7 +93,7 @@ mod tests {
         assert_eq!(refusal(&doubted, None, &policy), Refusal::NotItsOwn);
         let decay = Evidence { is_driven: false, ..equal };
         assert_eq!(refusal(&decay, Some(&best), &policy), Refusal::Undriven);
-        let expansion = Evidence { has_law: false, ..sound() };
+        let expansion = Evidence { is_expansion: true, ..sound() };
         assert_eq!(choose(&[expansion, equal], 1.05, &policy), Some(1));
         assert_eq!(choose(&[expansion, weaker], 1.05, &policy), Some(0));
         let more = Evidence { is_more: true, ..equal };

@@ -18,12 +18,13 @@ pub(super) fn finish(
     interrupted: bool,
     progress: Progress,
 ) -> Result<Refinement, Error> {
-    let (mut fitted, mut options) = refined(state, interrupted, progress)?;
-    state.point = fitted.point.clone();
-    while !interrupted && drop_impossible(state, required, progress)? {
-        (fitted, options) = refined(state, interrupted, progress)?;
+    let (fitted, options) = loop {
+        let (fitted, options) = refined(state, interrupted, progress)?;
         state.point = fitted.point.clone();
-    }
+        if interrupted || !drop_impossible(state, required, progress)? {
+            break (fitted, options);
+        }
+    };
     state.repair()?;
     let refined = Refined { fitted, options, outliers: 0, robust: false };
     let refinement = refined.finish(&state.prepared, progress)?;

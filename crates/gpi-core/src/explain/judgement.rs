@@ -57,8 +57,8 @@ pub(super) struct Evidence<'a> {
     pub is_slow: bool,
     /// Whether it is added to the output, and does nothing else.
     pub is_added: bool,
-    /// Whether it has a law of its own, and is no expansion in many terms.
-    pub has_law: bool,
+    /// Whether it is an expansion in many terms, without a law of its own.
+    pub is_expansion: bool,
     /// Whether the output integrates the input, and the error of a simulation is all that speaks for it.
     pub is_integrated: bool,
     /// Why its examination ended without a name, if so.
@@ -214,7 +214,7 @@ pub(super) mod tests {
             is_measured: false,
             is_slow: false,
             is_added: false,
-            has_law: true,
+            is_expansion: false,
             is_integrated: false,
             doubt: None,
         }

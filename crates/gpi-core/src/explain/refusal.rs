@@ -11,8 +11,8 @@ pub(super) enum Refusal {
     Unconfirmed,
     /// Far from the noise, too small a part of the residual.
     Insubstantial,
-    /// An expansion in many terms, where the residual is hardly above the noise.
-    FewPlays,
+    /// An expansion in many terms may follow what a finite number of plays leaves, which is hardly more than the noise.
+    MisfitOfPlays,
     /// No machine has such values.
     Impossible,
     /// A mode that follows a line, creep or a disturbance.
@@ -63,8 +63,8 @@ impl Refusal {
             Self::Insubstantial => {
                 "removes only a small part of a residual that is far above the noise".to_owned()
             }
-            Self::FewPlays => {
-                "has many terms, and the error of the model is so close to the noise that they may represent the misfit of a finite number of plays".to_owned()
+            Self::MisfitOfPlays => {
+                "has many terms, which may represent the misfit of a finite number of plays: the error of the model is already close to the noise".to_owned()
             }
             Self::Impossible => "would need parameter values that no real machine has".to_owned(),
             Self::NotAMode => {

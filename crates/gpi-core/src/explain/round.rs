@@ -288,9 +288,9 @@ fn evidence<'a>(
         is_measured: trial.entry.driven && trial.entry.stage == Stage::Added,
         is_slow: trial.entry.signature == Signature::SlowInTime,
         is_added: trial.entry.stage == Stage::Added,
-        has_law: !trial.entry.is_expansion,
+        is_expansion: trial.entry.is_expansion,
         is_integrated: balanced.is_none() && state.integrates()?,
-        doubt: unconfirmed.or(is_misfit.then_some(Refusal::FewPlays)),
+        doubt: unconfirmed.or(is_misfit.then_some(Refusal::MisfitOfPlays)),
     })
 }
 
