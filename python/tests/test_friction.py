@@ -116,12 +116,62 @@ def test_impossible_values_are_refused() -> None:
         with_loops(model_of(plant()), late, delay=2)
 
 
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_friction_is_that_of_a_mass_whichever_way_the_input_moves_it(direction: float) -> None:
+    # 0.5 y'' + 3 y' + 4 y + 0.2 f = u: poles of -2 and -4 per second, held at 100 Hz
+    poles = np.exp([-0.02, -0.04])
+    inputs = direction * np.array([1.0 - poles[0], (poles[1] - 1.0) / 2.0]) / 2.0
+    channel = [{"name": "c", "unit": ""}]
+    loop = {
+        "sees": {"output": 0},
+        "law": {"dahl": {"distance": 0.1, "averaged": True}},
+        "drives": {"input": 0, "force": 0.2 * direction, "states": 2},
+    }
+    straight = {
+        "envelope": {"thresholds": [0.0], "weights": [1.0], "reading": "one-sided"},
+        "plays": {"half_widths": [0.0], "weights": [1.0]},
+    }
+    model = {
+        "schema": "gpi-model/1",
+        "rate": 100.0,
+        "inputs": channel,
+        "outputs": channel,
+        "hysteresis": [straight],
+        "linear": {
+            "a": [[poles[0], 0.0, 0.0, poles[1]], 2, 2],
+            "b": [list(inputs), 2, 1],
+            "c": [[1.0, 1.0], 1, 2],
+            "d": [[0.0], 1, 1],
+        },
+        "offsets": [0.0],
+        "effects": [{"name": "friction", "loops": [loop]}],
+    }
+    (effect,) = gpi.Model.from_json(json.dumps(model)).effects
+    found = {own["name"]: own["value"] for own in effect["parameters"]}
+    wanted = {"mass": 0.5, "damping": 3.0, "spring_rate": 4.0, "friction_force": 0.2}
+    for name, value in wanted.items():
+        assert found[name] == pytest.approx(value), name
+
+
 @pytest.mark.slow
 def test_friction_of_a_motor_is_named() -> None:
     run = textbook.draw("motor", 1002)
     found = gpi.explain(gpi.Record(run.u, run.y, rate=run.rate))
     assert found.effects == ["friction"]
     assert found.after["holdout"]["rms"] < 2 * run.noise
+
+
+@pytest.mark.slow
+def test_friction_and_end_stops_of_a_slide_are_named_together() -> None:
+    run = textbook.draw("end-stops", 1001)
+    found = gpi.explain(gpi.Record(run.u, run.y, rate=run.rate))
+    assert found.effects == ["friction", "saturation"]
+    assert found.after["holdout"]["rms"] < 3 * run.noise < 0.2 * found.before["holdout"]["rms"]
+    stops = next(own for own in found.to_dict()["steps"] if own["effect"] == "saturation")["parameters"]
+    # the slide rests at both stops for some of the time
+    expected = np.quantile(run.y, [0.01, 0.99])
+    limits = sorted(stops[f"limit[{number}]"]["value"] for number in (0, 1))
+    np.testing.assert_allclose(limits, expected, atol=0.02 * np.ptp(run.y))
 
 
 @pytest.mark.slow

@@ -39,6 +39,18 @@ def test_a_friction_damper_is_a_bank_of_stops():
         assert held_out(answer) <= most * best_rival(answer)
 
 
+@pytest.mark.parametrize("file", ["throttle1", "throttle3"])
+def test_a_throttle_valve_rubs_between_end_stops(file):
+    answer = explained(f"throttle-valve/{file}.csv")
+    assert answer["effects"] == ["friction", "saturation"]
+    assert held_out(answer) < 0.25 * best_rival(answer)
+    friction, stops = (step["parameters"] for step in answer["steps"] if step["effect"])
+    # a positive input closes the valve
+    assert all(friction[name]["value"] > 0.0 for name in ("friction_force", "mass", "damping"))
+    limits = sorted(stops[f"limit[{number}]"]["value"] for number in (0, 1))
+    assert limits == pytest.approx([0.7, 4.4], abs=0.1)
+
+
 def test_an_effect_that_is_refused_in_the_end_leaves_no_worse_a_model():
     # an integrating stage: a drift that stands for its whole output is added first
     answer = explained(FOREIGN / "plant-16.csv.gz")

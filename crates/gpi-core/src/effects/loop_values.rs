@@ -220,7 +220,8 @@ fn quantities(loops: &[InnerLoop], units: Units) -> Vec<Quantity> {
 ///
 /// A limit of the displacement is printed as the output at it.
 ///
-/// Friction is printed as the part of the input that it takes away, together with the mass, damping and stiffness of the mechanics.
+/// Friction is printed as the part of the input that it takes away, together with the mass, damping and stiffness of the mechanics:
+/// of -u where a positive input moves the mass backwards.
 pub(super) fn in_steady_state(
     loops: &[InnerLoop],
     units: Units,
@@ -229,6 +230,7 @@ pub(super) fn in_steady_state(
     let of = |(q, inner): (usize, &InnerLoop)| {
         let steady = forces(inner)?;
         let SteadyForce { over_stiffness: force, of_input, period, mechanics, offset } = steady;
+        let of_input = direction(mechanics) * of_input;
         let (name, unit, value) = match &inner.law {
             Law::Power { exponent, scale } => {
                 let unit = match (units.output, exponent - 1) {
@@ -266,12 +268,18 @@ pub(super) fn in_steady_state(
     let mut found: Vec<Quantity> = loops.iter().enumerate().filter_map(of).collect();
     let rubs = |inner: &&InnerLoop| matches!(inner.law, Law::Dahl { .. });
     let rubbing = loops.iter().find(rubs).and_then(forces);
-    if let Some([mass, damping, stiffness]) = rubbing.and_then(|force| force.mechanics) {
+    if let Some(mechanics) = rubbing.and_then(|force| force.mechanics) {
+        let [mass, damping, stiffness] = mechanics.map(|own| direction(Some(mechanics)) * own);
         found.push(Quantity::new("mass", per_derivative(units, " s^2"), mass));
         found.push(Quantity::strength("damping", per_derivative(units, " s"), damping));
         found.push(Quantity::strength("spring_rate", per_derivative(units, ""), stiffness));
     }
     found
+}
+
+/// The sign of the acceleration that a positive input causes, where the mechanics are known: that of the mass.
+fn direction(mechanics: Option<[f64; 3]>) -> f64 {
+    mechanics.map_or(1.0, |[mass, ..]| mass.signum())
 }
 
 /// The unit of the input over that of a derivative of the output.

@@ -97,6 +97,11 @@ pub(super) fn squares(
 }
 
 impl Balance {
+    /// o, in units of the input.
+    pub(super) fn offset(&self) -> f64 {
+        self.solutions[1][UNFORCED - 1]
+    }
+
     /// The linear mechanics behind an input of so much gain that is held between samples; `growth` as in [`Section::growth`].
     pub(super) fn dynamics(&self, gain: f64, delay: usize, growth: f64) -> Result<Sections, Error> {
         let [k, c, m] = self.mechanics;

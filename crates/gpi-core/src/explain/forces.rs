@@ -8,6 +8,7 @@
 use super::force_balance::{Balance, balance, squares};
 use super::limits::limited;
 use super::outside::limits;
+use super::policy::BalancePolicy;
 use super::ranking::Ranked;
 use super::score::Score;
 use super::state::{SearchState, Trial};
@@ -21,7 +22,7 @@ use crate::fit::minimize::{FitOptions, Fitted};
 use crate::fit::preparation::rescale;
 use crate::linear::Sections;
 use crate::progress::Progress;
-use crate::{Error, Experiment, Matrix};
+use crate::{Error, Experiment, Matrix, Record};
 
 /// States of a mass.
 const MECHANICS: usize = 2;
@@ -68,7 +69,7 @@ pub(super) fn forces(
         if is_refused || state.out_of_reach.contains(entry.name) {
             continue;
         }
-        let proposals = proposals(state, &linear, entry);
+        let proposals = proposals(record, &linear, entry);
         let is_limit = |one: &Proposal<Effect>| one.block.limits();
         if proposals.iter().any(is_limit) {
             // more limits of a model that has some are tried by the score test
@@ -80,7 +81,9 @@ pub(super) fn forces(
             }
             continue;
         }
-        let Some((own, mut effect)) = best(state, &linear, proposals) else { continue };
+        let Some((own, mut effect)) = best(record, delay, proposals, &policy.balance) else {
+            continue;
+        };
         let Some(dynamics) = dynamics(&own) else { continue };
         let forces: Vec<f64> = own.forces.iter().map(|force| gain * force).collect();
         set_forces(&mut effect, &forces, &dynamics);
@@ -159,15 +162,15 @@ pub(super) fn balanced(state: &SearchState, trial: &Trial) -> Result<Option<Bala
 }
 
 /// The balance with the block of an effect whose forces explain most, if that is enough, and the block.
-fn best(
-    state: &SearchState,
-    linear: &Sections,
+pub(super) fn best(
+    record: &Record,
+    delay: usize,
     proposals: Vec<Proposal<Effect>>,
+    policy: &BalancePolicy,
 ) -> Option<(Balance, Effect)> {
-    let (record, policy) = (&state.prepared.record, &state.setup.policy.balance);
     let of = |proposal: Proposal<Effect>| {
         let loops = proposal.block.place().closed_loops()?.loops();
-        Some((balance(record, linear.delay, loops, policy)?, proposal.block))
+        Some((balance(record, delay, loops, policy)?, proposal.block))
     };
     let better = |known: (Balance, Effect), next: (Balance, Effect)| {
         if next.0.explained > known.0.explained { next } else { known }
@@ -177,7 +180,7 @@ fn best(
 }
 
 /// Gives the loops of an effect their forces, in the unit of v. They enter where the input does.
-fn set_forces(effect: &mut Effect, forces: &[f64], dynamics: &Sections) {
+pub(super) fn set_forces(effect: &mut Effect, forces: &[f64], dynamics: &Sections) {
     let PlaceMut::Loops(closed) = effect.place_mut() else { return };
     for (inner, found) in closed.loops_mut().iter_mut().zip(forces) {
         match &mut inner.drives {
@@ -188,7 +191,7 @@ fn set_forces(effect: &mut Effect, forces: &[f64], dynamics: &Sections) {
 }
 
 /// The present model with other dynamics and one more effect, if there is one, and without plays and deadzones.
-fn begin(
+pub(super) fn begin(
     state: &SearchState,
     straight: &Point,
     dynamics: Sections,
@@ -204,8 +207,11 @@ fn begin(
 }
 
 /// The proposals of an effect for a mass of these dynamics that moves as measured.
-fn proposals(state: &SearchState, dynamics: &Sections, entry: &Entry) -> Vec<Proposal<Effect>> {
-    let record = &state.prepared.record;
+pub(super) fn proposals(
+    record: &Record,
+    dynamics: &Sections,
+    entry: &Entry,
+) -> Vec<Proposal<Effect>> {
     let of = |signal: fn(&Experiment) -> &Matrix| -> Vec<Matrix> {
         let scored = |experiment: &Experiment| {
             let rows: Vec<usize> = experiment.scored_runs().flatten().collect();

@@ -74,7 +74,7 @@ pub(super) fn limited(
 }
 
 /// An effect of an entry's kind with these loops, each of which keeps what it sees at the limit.
-fn with_loops(
+pub(super) fn with_loops(
     state: &SearchState,
     point: &Point,
     entry: &Entry,

@@ -1,6 +1,7 @@
 //! The closed loop: rounds that add effects ([`super::round`]), until nothing more is confirmed and all that was named passes the last
 //! examination.
 
+use super::end_stops::add_end_stops;
 use super::examination::{doubt, impossible};
 use super::exchange::{exchange_slow, prefer_driven};
 use super::force_at_input::enter_with_input;
@@ -40,6 +41,7 @@ fn add_effects(state: &mut SearchState, progress: Progress) -> Result<(), Error>
         let is_changed = name_lags(state, progress)?
             || round(state, progress)?
             || add_pair(state, progress)?
+            || add_end_stops(state, progress)?
             || shed_lines(state, progress)?;
         if !is_changed {
             break;

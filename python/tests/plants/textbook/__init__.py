@@ -65,6 +65,7 @@ STAGES: dict[str, Stage] = {
     "dahl": stage(mechanics.dahl, may=MEMORY_IN_THE_FORCE, is_bipolar=True),
     "lugre": stage(mechanics.lugre, may=MEMORY_IN_THE_FORCE, is_bipolar=True),
     "motor": stage(mechanics.motor, may=["friction"], is_bipolar=True),
+    "end-stops": stage(mechanics.slide, may=["friction", "saturation"], is_bipolar=True),
     "hydraulic": stage(mechanics.hydraulic, is_bipolar=True),
     "tanks": stage(process.tanks, may=["output-nonlinearity", "saturation"]),
     "heater": stage(process.heater),

@@ -119,6 +119,32 @@ def motor(random: Generator, drive: Drive) -> Run:
     return scaled(random, drive, REACH * np.array(motion))
 
 
+def slide(random: Generator, drive: Drive) -> Run:
+    """A motor-driven slide between end stops: T v' = u - v - k x - c sign(v), x' = v, low <= x <= high.
+
+    At rest, dry friction takes any value up to c. A stop gives a part e of the speed back [1].
+
+    1. Brogliato, Nonsmooth Mechanics, Springer, 2016.
+    """
+    time = random.uniform(1, 5) / drive.resonance
+    coulomb, stiffness, back = random.uniform(0.1, 0.3), random.uniform(0.0, 1.0), random.uniform(0.0, 0.3)
+    low, high = -random.uniform(0.2, 0.4), random.uniform(0.2, 0.4)
+    steps = math.ceil(20 / time / drive.rate)
+    h = 1 / drive.rate / steps
+    rub = coulomb * h / time
+    speed = x = 0.0
+    motion = []
+    for value in drive.unit.tolist():
+        motion.append(x)
+        for _ in range(steps):
+            speed += h / time * (value - speed - stiffness * x)
+            speed = math.copysign(max(abs(speed) - rub, 0.0), speed)
+            x += REACH * h * speed
+            if not low <= x <= high:
+                x, speed = min(max(x, low), high), -back * speed
+    return scaled(random, drive, np.array(motion))
+
+
 def hydraulic(random: Generator, drive: Drive) -> Run:
     """A valve and a cylinder: x / q = 1 / (s (s^2 / w^2 + 2 damping s / w + 1)), q the flow [1, ch. 6].
 

@@ -10,7 +10,8 @@ mod search;
 pub(crate) use answer::{NoisePolicy, OutsidePolicy, ProposalPolicy, ResonancePolicy};
 pub(crate) use decisions::{ExaminationPolicy, JudgementPolicy, RevisionPolicy};
 pub(crate) use search::{
-    BalancePolicy, FitPolicy, GridPolicy, HoldoutPolicy, LimitPolicy, RankingPolicy, StepsPolicy,
+    BalancePolicy, EndStopPolicy, FitPolicy, GridPolicy, HoldoutPolicy, LimitPolicy, RankingPolicy,
+    StepsPolicy,
 };
 
 use crate::Error;
@@ -32,6 +33,8 @@ pub(crate) struct SearchPolicy {
     pub balance: BalancePolicy,
     /// Fits that begin at limits of states.
     pub limits: LimitPolicy,
+    /// Masses between end stops.
+    pub end_stops: EndStopPolicy,
     /// Which of them are accepted.
     pub judgement: JudgementPolicy,
     /// Whether the accepted trial has earned its name.
@@ -58,6 +61,7 @@ impl SearchPolicy {
         self.steps.validate()?;
         self.balance.validate()?;
         self.limits.validate()?;
+        self.end_stops.validate()?;
         self.judgement.validate()?;
         self.examination.validate()?;
         self.revision.validate()?;

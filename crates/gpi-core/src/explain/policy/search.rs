@@ -154,4 +154,32 @@ settings! {
         /// effects: most effects lower the squares of both by the same amount, so that the fit stays behind. By hand: twice the rms error.
         out_of_reach: f64 = 4.0, FROM_ONE;
     }
+
+    /// When a mass is said to move between end stops, see [`end_stops`](super::super::end_stops).
+    struct EndStopPolicy {
+        /// The rms change of the output over the samples that tell motion from rest, over its standard deviation, and the part of that
+        /// change from which on a sample moves. By hand: noise of 1 % of the standard deviation is far below both.
+        changed: f64 = 0.05, PART;
+        moving: f64 = 0.2, PART;
+        /// An experiment is so many times as long as these samples at least. By hand.
+        many_times: usize = 20, FROM_ONE;
+        /// Part of the squares of the balance of forces of the moving samples that dry friction explains. By hand: two measured throttle
+        /// valves have 0.96 and 0.97, a simulated slide 0.78 beside noise, and a stage with another hysteresis 0.28.
+        explained: f64 = 0.5, PART;
+        /// Friction holds an output that is pushed with less than so many times its force. By hand: friction at rest is often larger
+        /// than in motion.
+        pushed: f64 = 1.5, FROM_ONE;
+        /// Samples at a stop, at least, and the part of the samples that are held against more than friction. By hand.
+        samples: usize = 10, FROM_ONE;
+        one_place: f64 = 0.8, PART;
+        /// What is at one place, as a part of the range of the output, and the number of samples beyond it over those at the stop: a stop
+        /// may give way a little. By hand.
+        near: f64 = 0.05, PART;
+        beyond: f64 = 0.1, PART;
+        /// Parts of the speed that a stop takes away where fits begin: none, and much of it.
+        lost: [f64; 2] = [0.0, 0.5], PART;
+        /// Part of the squares that both effects together may leave of the model without them: half of its rms error. By hand: the
+        /// balance of forces has shown both already.
+        left: f64 = 0.25, PART;
+    }
 }

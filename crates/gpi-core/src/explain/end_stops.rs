@@ -1,0 +1,249 @@
+//! A mass with dry friction that moves between end stops.
+//!
+//! Neither friction nor the stops alone bring a model near such a record: a model without stops runs through them, and one without
+//! friction does not rest between them. Plays before the dynamics stand for both, and no small step leads from there to either.
+//!
+//! The balance of forces shows both without a simulation. Over the samples that move, dry friction explains most of its squares; where
+//! the output stands still although more than friction pushes it, it is at a stop ([`super::moving`]). A fit begins at the mass,
+//! the friction and the stops, without plays and deadzones. A stop takes away by how much the mass exceeds it, and a part beta of the
+//! speed with which it came. With the excess w of the displacement, the free response to `E w` is -w at once and `-(1 + beta) w` one
+//! sample later:
+//!
+//! ```text
+//! C E = -1,      C A E = -(1 + beta)
+//! ```
+//!
+//! Both effects are taken if the held-out blocks confirm them together and each beside the other, and if the model with both leaves a
+//! small part of the squares of the model without them, of the training data and of what is held out. At the end of the search, each is
+//! examined as any other effect.
+
+use super::examination::impossible;
+use super::force_balance::{Balance, balance};
+use super::forces::{begin, best, proposals, set_forces};
+use super::judgement::is_confirmed;
+use super::limits::with_loops;
+use super::moving::Motion;
+use super::ranking::Ranked;
+use super::round::add;
+use super::score::Score;
+use super::state::{Addition, SearchState, Trial};
+use super::trial::trial;
+use crate::chain::point::Point;
+use crate::effects::{Drives, Effect, Entry, InnerLoop, Law, Sees, Stage};
+use crate::fit::initial_state::settled;
+use crate::fit::minimize::{FitOptions, Fitted};
+use crate::linear::Sections;
+use crate::{Error, Progress};
+use nalgebra::{Matrix2, Vector2};
+
+/// What the balance of forces says of a mass between end stops.
+struct Machine {
+    /// The balance of the moving samples with its friction.
+    balance: Balance,
+    entry: &'static Entry,
+    friction: Effect,
+    /// Each with whether it is the lower one.
+    ends: Vec<(f64, bool)>,
+}
+
+/// Adds friction and end stops where the balance of forces shows both; says whether the model became another.
+pub(super) fn add_end_stops(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+    let beside: Vec<&'static str> = state.point.effects.iter().map(Effect::name).collect();
+    if state.stops_beside.as_ref() == Some(&beside) {
+        return Ok(false);
+    }
+    state.stops_beside = Some(beside);
+    let Some(next) = with_end_stops(state, progress)? else { return Ok(false) };
+    *state = next;
+    Ok(true)
+}
+
+/// The state with friction and end stops, if they are taken.
+fn with_end_stops<'a>(
+    state: &SearchState<'a>,
+    progress: Progress,
+) -> Result<Option<SearchState<'a>>, Error> {
+    let Some((limit, Machine { balance, entry, friction, ends })) = machine(state)? else {
+        return Ok(None);
+    };
+    let straight = state.point.without_hysteresis(&state.prepared.record);
+    let (delay, gain) = (straight.dynamics.delay, straight.channels[0].slope());
+    let growth = (state.setup.policy.balance.slowest / state.prepared.record.scored() as f64).exp();
+    let Ok(dynamics) = balance.dynamics(gain, delay, growth) else { return Ok(None) };
+    let forces: Vec<f64> = balance.forces.iter().map(|force| gain * force).collect();
+    let mut friction = friction;
+    set_forces(&mut friction, &forces, &dynamics);
+    let point = begin(state, &straight, dynamics, Some(friction));
+    let options = &state.setup.options;
+    let point = settled(point, &state.prepared.record, options, entry.name, progress)?;
+    let mut next = state.under(state.setup)?;
+    let alone = of_start(&next, entry, point.clone(), progress)?;
+    next.add(Addition::alone(alone))?;
+    let Some(stopped) = stopped(&next, &point, &ends, limit, progress)? else { return Ok(None) };
+    let both = of_start(&next, limit, stopped, progress)?;
+    add(&mut next, Addition::alone(both), progress)?;
+    Ok(is_taken(state, &next, [entry, limit], progress)?.then_some(next))
+}
+
+/// The machine that the balance of forces shows, and the entry of limits. None where the model is near the noise, has forces inside the
+/// mechanics already, or is held by the user.
+fn machine(state: &SearchState) -> Result<Option<(&'static Entry, Machine)>, Error> {
+    let (record, policy) = (&state.prepared.record, &state.setup.policy);
+    let moving = &state.setup.moving;
+    let is_single = record.outputs().len() == 1 && record.inputs().len() == 1;
+    let is_free = moving.half_widths && moving.thresholds && !state.setup.order_is_given;
+    let is_pointless = state.setup.is_one_sine || state.point.loops().next().is_some();
+    if !is_single || !is_free || is_pointless || state.is_near(&state.point)? {
+        return Ok(None);
+    }
+    let straight = state.point.without_hysteresis(record);
+    let (delay, gain) = (straight.dynamics.delay, straight.channels[0].slope());
+    let shown = || {
+        let motion = Motion::of(record, &policy.end_stops)?;
+        let moving = motion.moving(record)?;
+        let linear = balance(&moving, delay, &[], &policy.balance)?;
+        let linear = linear.dynamics(gain, delay, 1.0).ok()?;
+        let is_refused =
+            |entry: &Entry| state.refused.iter().any(|rejected| rejected.effect == entry.name);
+        let is_asked = |entry: &&Entry| entry.stage == Stage::Dynamics && !is_refused(entry);
+        let mut limit = None;
+        let mut found: Option<(Balance, &'static Entry, Effect)> = None;
+        for entry in state.setup.allowed.iter().copied().filter(is_asked) {
+            let mut proposed = proposals(&moving, &linear, entry);
+            if proposed.iter().any(|one| one.block.limits()) {
+                limit = Some(entry);
+                continue;
+            }
+            proposed.retain(|one| is_dry(&one.block));
+            let Some((own, effect)) = best(&moving, delay, proposed, &policy.balance) else {
+                continue;
+            };
+            if found.as_ref().is_none_or(|(known, ..)| known.explained < own.explained) {
+                found = Some((own, entry, effect));
+            }
+        }
+        let (balance, entry, friction) = found?;
+        let loops = friction.place().closed_loops()?.loops();
+        let ends = motion.ends(record, delay, (&balance, loops), &policy.end_stops);
+        let is_shown = balance.explained >= policy.end_stops.explained && !ends.is_empty();
+        is_shown.then_some((limit?, Machine { balance, entry, friction, ends }))
+    };
+    Ok(if gain == 0.0 { None } else { shown() })
+}
+
+/// Whether the forces of an effect oppose a motion whatever its speed, and nothing else.
+fn is_dry(effect: &Effect) -> bool {
+    let Some(closed) = effect.place().closed_loops() else { return false };
+    let mut laws = closed.loops().iter().map(|inner| &inner.law);
+    laws.any(Law::is_dissipative)
+        && !closed.loops().iter().any(|inner| inner.law.is_hysteretic_spring())
+}
+
+/// The best fit of a mass that stops at the ends, of those that begin with different losses of speed.
+fn stopped(
+    state: &SearchState,
+    point: &Point,
+    ends: &[(f64, bool)],
+    entry: &'static Entry,
+    progress: Progress,
+) -> Result<Option<Point>, Error> {
+    let policy = &state.setup.policy;
+    let options = FitOptions { steps: policy.fits.far_steps, ..state.setup.options.clone() };
+    let offset = point.offsets[0][(0, 0)];
+    let mut best: Option<Fitted> = None;
+    for lost in policy.end_stops.lost {
+        let Some(column) = column(&point.dynamics, lost) else { continue };
+        let inner = |&(place, is_lower): &(f64, bool)| InnerLoop {
+            sees: Sees::Output(0),
+            law: Law::Excess { limit: place - offset, is_lower },
+            drives: Drives::States(column.clone()),
+        };
+        let loops = ends.iter().map(inner).collect();
+        let Some(effect) = with_loops(state, point, entry, loops)? else { continue };
+        let fitted = state.fit(point.with_effect(effect), &options, entry.name, progress)?;
+        let is_better = |known: &Fitted| fitted.linearization.cost < known.linearization.cost;
+        if best.as_ref().is_none_or(is_better) {
+            best = Some(fitted);
+        }
+    }
+    Ok(best.map(|fitted| fitted.point))
+}
+
+/// E of a stop that takes the excess away, and a part of the speed.
+fn column(dynamics: &Sections, lost: f64) -> Option<Vec<f64>> {
+    let now: Vec<f64> = dynamics.c().row(0).iter().copied().collect();
+    let sections = dynamics.sections.iter();
+    let then: Vec<f64> = sections
+        .flat_map(|own| (own.c.rows(0, 1) * own.matrix()).iter().copied().collect::<Vec<f64>>())
+        .collect();
+    let (&[a, b], &[c, d]) = (now.as_slice(), then.as_slice()) else { return None };
+    let column = Matrix2::new(a, b, c, d).lu().solve(&-Vector2::new(1.0, 1.0 + lost))?;
+    Some(column.as_slice().to_vec())
+}
+
+/// The trial of an effect whose fit begins at a point.
+fn of_start(
+    state: &SearchState,
+    entry: &'static Entry,
+    point: Point,
+    progress: Progress,
+) -> Result<Trial, Error> {
+    let own = point.effects.iter().rfind(|effect| effect.name() == entry.name);
+    let start = own.unwrap_or(&point.effects[0]).clone();
+    let gain = 1.0 - state.training_squares(&point)? / state.cost;
+    let score = Score { columns: start.values().len(), start, zero: None, gain };
+    let ranked = Ranked { entry, score, worth: gain, start: Some(point), others: Vec::new() };
+    trial(state, ranked, progress)
+}
+
+/// Whether both effects are taken.
+fn is_taken(
+    state: &SearchState,
+    next: &SearchState,
+    entries: [&Entry; 2],
+    progress: Progress,
+) -> Result<bool, Error> {
+    let policy = &state.setup.policy;
+    let (before, both) = (state.held_out(&state.point)?, next.held_out(&next.point)?);
+    let sum = |blocks: &[f64]| blocks.iter().sum::<f64>();
+    let most = policy.end_stops.left;
+    let is_small = next.cost <= most * state.cost && sum(&both) <= most * sum(&before);
+    if !is_small || !is_confirmed([&before, &both], &policy.judgement) {
+        return Ok(false);
+    }
+    for entry in entries {
+        let place = next.point.effects.iter().rposition(|effect| effect.name() == entry.name);
+        let Some(place) = place else { return Ok(false) };
+        let (without, _) = next.best_without(place, progress)?;
+        let is_confirmed = is_confirmed([&next.held_out(&without)?, &both], &policy.judgement);
+        if !is_confirmed || impossible(next, &next.point, place)?.is_some() {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Matrix;
+    use crate::chain::plain::plain;
+
+    #[test]
+    fn a_stop_takes_the_excess_and_a_part_of_the_speed() {
+        // poles at 1 and 0.5, in two sections and in one
+        let apart = plain(&[0.0, 0.1], &[1.0, -1.5, 0.5], Vec::new()).dynamics;
+        let c: Vec<f64> = apart.c().iter().copied().collect();
+        for lost in [0.0, 0.5] {
+            let own = column(&apart, lost).unwrap();
+            let at_once: f64 = c.iter().zip(&own).map(|(c, e)| c * e).sum();
+            assert!((at_once + 1.0).abs() < 1e-12);
+            // the state one sample later
+            let system = apart.to_state_space().unwrap();
+            let then = system.c() * system.a() * Matrix::from_column_slice(2, 1, &own);
+            assert!((then[(0, 0)] + 1.0 + lost).abs() < 1e-12);
+        }
+        let first = plain(&[0.0, 0.1], &[1.0, -0.5], Vec::new()).dynamics;
+        assert_eq!(column(&first, 0.0), None);
+    }
+}
