@@ -168,10 +168,10 @@ def test_friction_and_end_stops_of_a_slide_are_named_together() -> None:
     assert found.effects == ["friction", "saturation"]
     assert found.after["holdout"]["rms"] < 3 * run.noise < 0.2 * found.before["holdout"]["rms"]
     stops = next(own for own in found.to_dict()["steps"] if own["effect"] == "saturation")["parameters"]
-    # the slide rests at both stops for some of the time
+    # the slide rests at both stops for some of the time; a stop gives way a little
     expected = np.quantile(run.y, [0.01, 0.99])
     limits = sorted(stops[f"limit[{number}]"]["value"] for number in (0, 1))
-    np.testing.assert_allclose(limits, expected, atol=0.02 * np.ptp(run.y))
+    np.testing.assert_allclose(limits, expected, rtol=0, atol=0.1 * np.ptp(run.y))
 
 
 @pytest.mark.slow

@@ -44,7 +44,8 @@ def test_a_throttle_valve_rubs_between_end_stops(file):
     answer = explained(f"throttle-valve/{file}.csv")
     assert answer["effects"] == ["friction", "saturation"]
     assert held_out(answer) < 0.25 * best_rival(answer)
-    friction, stops = (step["parameters"] for step in answer["steps"] if step["effect"])
+    found = {step["effect"]: step["parameters"] for step in answer["steps"]}
+    friction, stops = found["friction"], found["saturation"]
     # a positive input closes the valve
     assert all(friction[name]["value"] > 0.0 for name in ("friction_force", "mass", "damping"))
     limits = sorted(stops[f"limit[{number}]"]["value"] for number in (0, 1))
