@@ -11,8 +11,8 @@
 //!    if it leaves the model far above the noise (`restart`). It is accepted if it is
 //!    significant and the held-out blocks confirm it (`judgement`), and if what it does is its own
 //!    (`examination`). Effects that it makes superfluous are dropped (`revision`).
-//!    Where none is accepted, two effects that are only confirmed together are tried (`pairs`), and a mass with friction between end
-//!    stops (`end_stops`).
+//!    Where none is accepted, two effects that are only confirmed together are tried (`pairs`), and a mass that slides with friction,
+//!    perhaps between end stops (`sliding_mass`).
 //! 4. Steps 2 and 3 are repeated until no effect is accepted. Then an effect that the input drives replaces a slow
 //!    function of time that it explains as well, forces inside the mechanics enter where the input does if that explains nearly as
 //!    much (`force_at_input`), and the residual is tested for remaining structure (`residual`).
@@ -22,14 +22,13 @@
 //!
 //! The files import in one direction only: `policy` (every tolerance), `threshold`, `judgement`, `choice`, `base`, `projection`,
 //! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `sensor_range`, `slow_candidate`, `trial`,
-//! `restart`, `moving`, `examination`, `grid`, `revision`, `round`, `slow_poles`, `pairs`, `end_stops`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
+//! `restart`, `moving`, `examination`, `grid`, `revision`, `round`, `slow_poles`, `pairs`, `sliding_mass`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
 
 pub(crate) mod base;
 mod blocks;
 mod choice;
 mod coloured;
 mod concurrently;
-mod end_stops;
 mod examination;
 mod exchange;
 mod explanation;
@@ -59,6 +58,7 @@ mod score;
 mod search;
 mod sensor_range;
 mod setup;
+mod sliding_mass;
 mod slip;
 mod slow_candidate;
 mod slow_poles;

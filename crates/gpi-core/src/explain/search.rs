@@ -1,7 +1,6 @@
 //! The closed loop: rounds that add effects ([`super::round`]), until nothing more is confirmed and all that was named passes the last
 //! examination.
 
-use super::end_stops::add_end_stops;
 use super::examination::{doubt, impossible};
 use super::exchange::{exchange_slow, prefer_driven};
 use super::force_at_input::enter_with_input;
@@ -10,6 +9,7 @@ use super::ranking::scored_beside;
 use super::refusal::Refusal;
 use super::revision::{keep_plausible, shed_lines, straighten};
 use super::round::round;
+use super::sliding_mass::add_sliding_mass;
 use super::slow_poles::name_lags;
 use super::state::{Addition, Rejected, SearchState};
 use super::trial::trial;
@@ -41,7 +41,7 @@ fn add_effects(state: &mut SearchState, progress: Progress) -> Result<(), Error>
         let is_changed = name_lags(state, progress)?
             || round(state, progress)?
             || add_pair(state, progress)?
-            || add_end_stops(state, progress)?
+            || add_sliding_mass(state, progress)?
             || shed_lines(state, progress)?;
         if !is_changed {
             break;

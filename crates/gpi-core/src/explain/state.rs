@@ -140,8 +140,8 @@ pub(super) struct SearchState<'a> {
     pub surpassing: Surpassing,
     /// Names of the effects beside which the balance of forces was asked last.
     pub balanced_beside: Option<Vec<&'static str>>,
-    /// Names of the effects beside which end stops were asked for last.
-    pub stops_beside: Option<Vec<&'static str>>,
+    /// Names of the effects beside which a sliding mass was asked for last.
+    pub slid_beside: Option<Vec<&'static str>>,
     /// Effects whose fits from the balance of forces ended far above the model.
     pub out_of_reach: BTreeSet<&'static str>,
     /// Whether the output integrates the input, once that was asked.
@@ -167,7 +167,7 @@ impl<'a> SearchState<'a> {
             refused: Vec::new(),
             surpassing: Surpassing::default(),
             balanced_beside: None,
-            stops_beside: None,
+            slid_beside: None,
             out_of_reach: BTreeSet::new(),
             integrates: OnceLock::new(),
         }
@@ -192,7 +192,7 @@ impl<'a> SearchState<'a> {
             // errors under another loss are not comparable
             surpassing: Surpassing::default(),
             balanced_beside: None,
-            stops_beside: None,
+            slid_beside: None,
             out_of_reach: self.out_of_reach.clone(),
             integrates: self.integrates.clone(),
         };

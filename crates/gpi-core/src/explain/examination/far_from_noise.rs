@@ -21,15 +21,14 @@
 //! - creep, and limits of states, unless they leave no more than a part of the squares of the best model without them, as in all of
 //!   these cases but that of a limit also of the held-out squares: these show little of a limit that is reached now and then;
 //! - a hysteretic force in such a loop that leaves more than a part of the squares of the best model without it, because it
-//!   resembles a hysteresis before the dynamics, unless it is the dry friction of a mass between end stops that explains most of the
-//!   balance of forces of its motion.
+//!   resembles a hysteresis before the dynamics, unless it is dry friction that the balance of forces of the samples that move shows.
 //!
 //! Lines and measured columns are not asked, because no misfit resembles them, nor are modes, other loops and shapes of
 //! hysteresis loops, which may well be a large part. A shape of hysteresis loops is not named if the output integrates the input: small
 //! errors of v add up to a large one.
 
 use super::contribution::contribution;
-use super::is_between_stops;
+use super::is_shown_by_motion;
 use crate::chain::point::Point;
 use crate::effects::{FreeOrder, Place, Signature};
 use crate::explain::force_balance::balance;
@@ -92,7 +91,7 @@ pub(super) fn doubt(
             Ok(leaves(policy.left_at_most)?.then_some(Refusal::Insubstantial))
         } else {
             let is_weak = own.loops().iter().any(|inner| inner.law.is_dissipative())
-                && !is_between_stops(state, point, own.loops())
+                && !is_shown_by_motion(state, point, own.loops())
                 && leaves(policy.left)?;
             Ok(is_weak.then_some(Refusal::ResemblesMisfit))
         }

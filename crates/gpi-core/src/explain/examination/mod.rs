@@ -207,7 +207,7 @@ pub(super) fn impossible(
         let dissipates = closed.loops().iter().any(|inner| inner.law.is_dissipative());
         let shows = point.dynamics.has_resonance()
             || (dissipates && state.integrates()?)
-            || is_between_stops(state, point, closed.loops())
+            || is_shown_by_motion(state, point, closed.loops())
             // a tank with a limit has a nonlinear outflow, and no resonance
             || (!dissipates && point.effects.iter().any(Effect::limits));
         if !effect.limits() && !shows {
@@ -223,10 +223,11 @@ pub(super) fn impossible(
     Ok((!effect.block().is_none_or(Block::is_possible)).then_some(Refusal::Impossible))
 }
 
-/// Whether loops are the dry friction of a mass between end stops, which the balance of forces of its motion shows.
-fn is_between_stops(state: &SearchState, point: &Point, loops: &[InnerLoop]) -> bool {
+/// Whether loops are dry friction, which the balance of forces of the samples that move shows.
+fn is_shown_by_motion(state: &SearchState, point: &Point, loops: &[InnerLoop]) -> bool {
     let is_dry = loops.iter().any(|inner| inner.law.is_dissipative());
-    is_dry && point.effects.iter().any(Effect::limits) && rubs(state, point.dynamics.delay, loops)
+    let stops = point.effects.iter().any(Effect::limits);
+    is_dry && rubs(state, point.dynamics.delay, loops, stops)
 }
 
 /// Whether a loop is a force with beta > 0 that follows the displacement instead of opposing it: each cycle would add energy.

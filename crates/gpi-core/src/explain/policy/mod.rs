@@ -10,7 +10,7 @@ mod search;
 pub(crate) use answer::{NoisePolicy, OutsidePolicy, ProposalPolicy, ResonancePolicy};
 pub(crate) use decisions::{ExaminationPolicy, JudgementPolicy, RevisionPolicy};
 pub(crate) use search::{
-    BalancePolicy, EndStopPolicy, FitPolicy, GridPolicy, HoldoutPolicy, LimitPolicy, RankingPolicy,
+    BalancePolicy, FitPolicy, GridPolicy, HoldoutPolicy, LimitPolicy, RankingPolicy, SlidingPolicy,
     StepsPolicy,
 };
 
@@ -33,8 +33,8 @@ pub(crate) struct SearchPolicy {
     pub balance: BalancePolicy,
     /// Fits that begin at limits of states.
     pub limits: LimitPolicy,
-    /// Masses between end stops.
-    pub end_stops: EndStopPolicy,
+    /// Masses that slide with dry friction.
+    pub sliding: SlidingPolicy,
     /// Which of them are accepted.
     pub judgement: JudgementPolicy,
     /// Whether the accepted trial has earned its name.
@@ -61,7 +61,7 @@ impl SearchPolicy {
         self.steps.validate()?;
         self.balance.validate()?;
         self.limits.validate()?;
-        self.end_stops.validate()?;
+        self.sliding.validate()?;
         self.judgement.validate()?;
         self.examination.validate()?;
         self.revision.validate()?;

@@ -155,17 +155,19 @@ settings! {
         out_of_reach: f64 = 4.0, FROM_ONE;
     }
 
-    /// When a mass is said to move between end stops, see [`end_stops`](super::super::end_stops).
-    struct EndStopPolicy {
+    /// When a mass is said to slide, see [`sliding_mass`](super::super::sliding_mass).
+    struct SlidingPolicy {
         /// The rms change of the output over the samples that tell motion from rest, over its standard deviation, and the part of that
         /// change from which on a sample moves. By hand: noise of 1 % of the standard deviation is far below both.
         changed: f64 = 0.05, PART;
         moving: f64 = 0.2, PART;
         /// An experiment is so many times as long as these samples at least. By hand.
         many_times: usize = 20, FROM_ONE;
-        /// Part of the squares of the balance of forces of the moving samples that dry friction explains. By hand: two measured throttle
-        /// valves have 0.96 and 0.97, a simulated slide 0.78 beside noise, and a stage with another hysteresis 0.28.
+        /// Part of the squares of the balance of forces of the moving samples that dry friction explains where there is an end stop, and
+        /// where there is none. By hand: two measured throttle valves have 0.96 and 0.97, simulated slides 0.78 to 0.999, and stages with
+        /// another hysteresis up to 0.74.
         explained: f64 = 0.5, PART;
+        alone: f64 = 0.95, PART;
         /// Friction holds an output that is pushed with less than so many times its force. By hand: friction at rest is often larger
         /// than in motion.
         pushed: f64 = 1.5, FROM_ONE;
@@ -178,8 +180,8 @@ settings! {
         beyond: f64 = 0.1, PART;
         /// Parts of the speed that a stop takes away where fits begin: none, and much of it.
         lost: [f64; 2] = [0.0, 0.5], PART;
-        /// Part of the squares that both effects together may leave of the model without them: half of its rms error. By hand: the
-        /// balance of forces has shown both already.
+        /// Part of the squares that the model with all of this may leave of the model without it: half of its rms error. By hand: the
+        /// balance of forces has shown the friction already.
         left: f64 = 0.25, PART;
     }
 }

@@ -1,7 +1,8 @@
-//! A mass with dry friction that moves between end stops.
+//! A mass that slides with dry friction, perhaps between end stops.
 //!
-//! Neither friction nor the stops alone bring a model near such a record: a model without stops runs through them, and one without
-//! friction does not rest between them. Plays before the dynamics stand for both, and no small step leads from there to either.
+//! Where nothing resonates, plays before the dynamics stand for friction inside them, and no small step leads from there to the friction. A
+//! model without end stops runs through them, and one without friction does not rest between them, so that each of both alone may not
+//! bring a model near such a record.
 //!
 //! The balance of forces shows both without a simulation. Over the samples that move, dry friction explains most of its squares; where
 //! the output stands still although more than friction pushes it, it is at a stop ([`super::moving`]). A fit begins at the mass,
@@ -13,9 +14,9 @@
 //! C E = -1,      C A E = -(1 + beta)
 //! ```
 //!
-//! Both effects are taken if the held-out blocks confirm them together and each beside the other, and if the model with both leaves a
-//! small part of the squares of the model without them, of the training data and of what is held out. At the end of the search, each is
-//! examined as any other effect.
+//! What is added is taken if the held-out blocks confirm all of it together and each part beside the other, and if the model with it leaves a
+//! small part of the squares of the model without it, of the training data and of what is held out. At the end of the search, each effect is
+//! examined as any other.
 
 use super::examination::impossible;
 use super::force_balance::{Balance, balance};
@@ -36,70 +37,87 @@ use crate::linear::Sections;
 use crate::{Error, Progress};
 use nalgebra::{Matrix2, Vector2};
 
-/// What the balance of forces says of a mass between end stops.
+/// What the balance of forces says of a mass that slides.
 struct Machine {
     /// The balance of the moving samples with its friction.
     balance: Balance,
     entry: &'static Entry,
     friction: Effect,
-    /// Each with whether it is the lower one.
-    ends: Vec<(f64, bool)>,
+    /// The entry of limits and the end stops, each with whether it is the lower one, where there are any.
+    stops: Option<(&'static Entry, Vec<(f64, bool)>)>,
 }
 
-/// Adds friction and end stops where the balance of forces shows both; says whether the model became another.
-pub(super) fn add_end_stops(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
+/// Adds friction, and end stops where there are any, if the balance of forces shows them; says whether the model became another.
+pub(super) fn add_sliding_mass(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     let beside: Vec<&'static str> = state.point.effects.iter().map(Effect::name).collect();
-    if state.stops_beside.as_ref() == Some(&beside) {
+    if state.slid_beside.as_ref() == Some(&beside) {
         return Ok(false);
     }
-    state.stops_beside = Some(beside);
-    let Some(next) = with_end_stops(state, progress)? else { return Ok(false) };
+    state.slid_beside = Some(beside);
+    let Some(next) = sliding(state, progress)? else { return Ok(false) };
     *state = next;
     Ok(true)
 }
 
-/// The state with friction and end stops, if they are taken.
-fn with_end_stops<'a>(
+/// The state with what the balance of forces shows, if that is taken.
+fn sliding<'a>(
     state: &SearchState<'a>,
     progress: Progress,
 ) -> Result<Option<SearchState<'a>>, Error> {
-    let Some((limit, Machine { balance, entry, friction, ends })) = machine(state)? else {
+    let Some(Machine { balance, entry, mut friction, stops }) = machine(state)? else {
         return Ok(None);
     };
+    let policy = &state.setup.policy;
     let straight = state.point.without_hysteresis(&state.prepared.record);
     let (delay, gain) = (straight.dynamics.delay, straight.channels[0].slope());
-    let growth = (state.setup.policy.balance.slowest / state.prepared.record.scored() as f64).exp();
+    let growth = (policy.balance.slowest / state.prepared.record.scored() as f64).exp();
     let Ok(dynamics) = balance.dynamics(gain, delay, growth) else { return Ok(None) };
     let forces: Vec<f64> = balance.forces.iter().map(|force| gain * force).collect();
-    let mut friction = friction;
     set_forces(&mut friction, &forces, &dynamics);
     let point = begin(state, &straight, dynamics, Some(friction));
     let options = &state.setup.options;
     let point = settled(point, &state.prepared.record, options, entry.name, progress)?;
+    let alone = of_start(state, entry, point.clone(), progress)?;
+    if let Some((limit, ends)) = stops {
+        let mut next = state.under(state.setup)?;
+        next.add(Addition::alone(alone.clone()))?;
+        if let Some(stopped) = stopped(&next, &point, &ends, limit, progress)? {
+            let both = of_start(&next, limit, stopped, progress)?;
+            add(&mut next, Addition::alone(both), progress)?;
+            if is_taken(state, &next, &[entry, limit], progress)? {
+                return Ok(Some(next));
+            }
+        }
+    }
+    if balance.explained < policy.sliding.alone {
+        return Ok(None);
+    }
     let mut next = state.under(state.setup)?;
-    let alone = of_start(&next, entry, point.clone(), progress)?;
-    next.add(Addition::alone(alone))?;
-    let Some(stopped) = stopped(&next, &point, &ends, limit, progress)? else { return Ok(None) };
-    let both = of_start(&next, limit, stopped, progress)?;
-    add(&mut next, Addition::alone(both), progress)?;
-    Ok(is_taken(state, &next, [entry, limit], progress)?.then_some(next))
+    add(&mut next, Addition::alone(alone), progress)?;
+    Ok(is_taken(state, &next, &[entry], progress)?.then_some(next))
 }
 
-/// The machine that the balance of forces shows, and the entry of limits. None where the model is near the noise, has forces inside the
-/// mechanics already, or is held by the user.
-fn machine(state: &SearchState) -> Result<Option<(&'static Entry, Machine)>, Error> {
+/// The machine that the balance of forces shows. None where the model is near the noise, has forces inside the mechanics already, or is
+/// held by the user, and where the output integrates the input: forces are then judged by the balance alone, and the overlap of a
+/// valve does to it what friction does.
+fn machine(state: &SearchState) -> Result<Option<Machine>, Error> {
     let (record, policy) = (&state.prepared.record, &state.setup.policy);
     let moving = &state.setup.moving;
     let is_single = record.outputs().len() == 1 && record.inputs().len() == 1;
     let is_free = moving.half_widths && moving.thresholds && !state.setup.order_is_given;
     let is_pointless = state.setup.is_one_sine || state.point.loops().next().is_some();
-    if !is_single || !is_free || is_pointless || state.is_near(&state.point)? {
+    if !is_single
+        || !is_free
+        || is_pointless
+        || state.is_near(&state.point)?
+        || state.integrates()?
+    {
         return Ok(None);
     }
     let straight = state.point.without_hysteresis(record);
     let (delay, gain) = (straight.dynamics.delay, straight.channels[0].slope());
     let shown = || {
-        let motion = Motion::of(record, &policy.end_stops)?;
+        let motion = Motion::of(record, &policy.sliding)?;
         let moving = motion.moving(record)?;
         let linear = balance(&moving, delay, &[], &policy.balance)?;
         let linear = linear.dynamics(gain, delay, 1.0).ok()?;
@@ -124,9 +142,11 @@ fn machine(state: &SearchState) -> Result<Option<(&'static Entry, Machine)>, Err
         }
         let (balance, entry, friction) = found?;
         let loops = friction.place().closed_loops()?.loops();
-        let ends = motion.ends(record, delay, (&balance, loops), &policy.end_stops);
-        let is_shown = balance.explained >= policy.end_stops.explained && !ends.is_empty();
-        is_shown.then_some((limit?, Machine { balance, entry, friction, ends }))
+        let ends = motion.ends(record, delay, (&balance, loops), &policy.sliding);
+        let is_shown = balance.explained >= policy.sliding.explained;
+        let stops = limit.filter(|_| is_shown && !ends.is_empty()).map(|entry| (entry, ends));
+        let is_friction = stops.is_some() || balance.explained >= policy.sliding.alone;
+        is_friction.then_some(Machine { balance, entry, friction, stops })
     };
     Ok(if gain == 0.0 { None } else { shown() })
 }
@@ -151,7 +171,7 @@ fn stopped(
     let options = FitOptions { steps: policy.fits.far_steps, ..state.setup.options.clone() };
     let offset = point.offsets[0][(0, 0)];
     let mut best: Option<Fitted> = None;
-    for lost in policy.end_stops.lost {
+    for lost in policy.sliding.lost {
         let Some(column) = column(&point.dynamics, lost) else { continue };
         let inner = |&(place, is_lower): &(f64, bool)| InnerLoop {
             sees: Sees::Output(0),
@@ -196,17 +216,17 @@ fn of_start(
     trial(state, ranked, progress)
 }
 
-/// Whether both effects are taken.
+/// Whether these effects of the next model are taken.
 fn is_taken(
     state: &SearchState,
     next: &SearchState,
-    entries: [&Entry; 2],
+    entries: &[&Entry],
     progress: Progress,
 ) -> Result<bool, Error> {
     let policy = &state.setup.policy;
     let (before, both) = (state.held_out(&state.point)?, next.held_out(&next.point)?);
     let sum = |blocks: &[f64]| blocks.iter().sum::<f64>();
-    let most = policy.end_stops.left;
+    let most = policy.sliding.left;
     let is_small = next.cost <= most * state.cost && sum(&both) <= most * sum(&before);
     if !is_small || !is_confirmed([&before, &both], &policy.judgement) {
         return Ok(false);
