@@ -46,7 +46,7 @@ def test_a_throttle_valve_rubs_between_end_stops(file):
     assert held_out(answer) < 0.25 * best_rival(answer)
     found = {step["effect"]: step["parameters"] for step in answer["steps"]}
     friction, stops = found["friction"], found["saturation"]
-    # a positive input closes the valve
+    # a positive input lowers the output
     assert all(friction[name]["value"] > 0.0 for name in ("friction_force", "mass", "damping"))
     limits = sorted(stops[f"limit[{number}]"]["value"] for number in (0, 1))
     assert limits == pytest.approx([0.7, 4.4], abs=0.1)

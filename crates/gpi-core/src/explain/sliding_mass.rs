@@ -1,8 +1,8 @@
 //! A mass that slides with dry friction, perhaps between end stops.
 //!
 //! Where nothing resonates, plays before the dynamics stand for friction inside them, and no small step leads from there to the friction. A
-//! model without end stops runs through them, and one without friction does not rest between them, so that each of both alone may not
-//! bring a model near such a record.
+//! model without end stops runs through them, and one without friction does not rest between them, so that neither of them alone
+//! need bring a model near such a record.
 //!
 //! The balance of forces shows both without a simulation. Over the samples that move, dry friction explains most of its squares; where
 //! the output stands still although more than friction pushes it, it is at a stop ([`super::moving`]). A fit begins at the mass,
@@ -251,15 +251,15 @@ mod tests {
 
     #[test]
     fn a_stop_takes_the_excess_and_a_part_of_the_speed() {
-        // poles at 1 and 0.5, in two sections and in one
-        let apart = plain(&[0.0, 0.1], &[1.0, -1.5, 0.5], Vec::new()).dynamics;
-        let c: Vec<f64> = apart.c().iter().copied().collect();
+        // poles at 1 and 0.5
+        let dynamics = plain(&[0.0, 0.1], &[1.0, -1.5, 0.5], Vec::new()).dynamics;
+        let c: Vec<f64> = dynamics.c().iter().copied().collect();
         for lost in [0.0, 0.5] {
-            let own = column(&apart, lost).unwrap();
+            let own = column(&dynamics, lost).unwrap();
             let at_once: f64 = c.iter().zip(&own).map(|(c, e)| c * e).sum();
             assert!((at_once + 1.0).abs() < 1e-12);
             // the state one sample later
-            let system = apart.to_state_space().unwrap();
+            let system = dynamics.to_state_space().unwrap();
             let then = system.c() * system.a() * Matrix::from_column_slice(2, 1, &own);
             assert!((then[(0, 0)] + 1.0 + lost).abs() < 1e-12);
         }

@@ -120,9 +120,9 @@ def motor(random: Generator, drive: Drive) -> Run:
 
 
 def slide(random: Generator, drive: Drive) -> Run:
-    """A motor-driven slide between end stops: T v' = u - v - k x - c sign(v), x' = v, low <= x <= high.
+    """A motor-driven slide between end stops: T v' = u - v - k x - c sign(v), low <= x <= high.
 
-    At rest, dry friction takes any value up to c. A stop gives a part e of the speed back [1].
+    x' = `REACH` v. At rest, dry friction takes any value up to c. A stop gives a part of the speed back [1].
 
     1. Brogliato, Nonsmooth Mechanics, Springer, 2016.
     """

@@ -164,8 +164,8 @@ settings! {
         /// An experiment is so many times as long as these samples at least. By hand.
         many_times: usize = 20, FROM_ONE;
         /// Part of the squares of the balance of forces of the moving samples that dry friction explains where there is an end stop, and
-        /// where there is none. By hand: two measured throttle valves have 0.96 and 0.97, simulated slides 0.78 to 0.999, and stages with
-        /// another hysteresis up to 0.74.
+        /// where there is none. By hand: without a stop, another hysteresis that depends on the direction may explain more than half, but
+        /// hardly all.
         explained: f64 = 0.5, PART;
         alone: f64 = 0.95, PART;
         /// Friction holds an output that is pushed with less than so many times its force. By hand: friction at rest is often larger
@@ -178,7 +178,7 @@ settings! {
         /// may give way a little. By hand.
         near: f64 = 0.05, PART;
         beyond: f64 = 0.1, PART;
-        /// Parts of the speed that a stop takes away where fits begin: none, and much of it.
+        /// Parts of the speed that a stop takes away where fits begin: none, and much of it. By hand: a fit from one start may end in a minimum far above the other.
         lost: [f64; 2] = [0.0, 0.5], PART;
         /// Part of the squares that the model with all of this may leave of the model without it: half of its rms error. By hand: the
         /// balance of forces has shown the friction already.
