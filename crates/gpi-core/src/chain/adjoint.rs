@@ -42,13 +42,12 @@
 //! (reverse mode).
 
 use super::between::{Between, Row};
-use super::group::Group;
 use super::injections::{Injection, Places, injections};
 use super::motion::{advance_adjoint, columns, rows};
 use super::point::{Freedom, Point};
 use super::stream::Stream;
 use super::table::Table;
-use super::tangents::{Trace, memories, sensed};
+use super::tangents::{Trace, forgets, memories, sensed, starts};
 use crate::effects::{InnerLoop, Sees, Slope};
 use crate::linear::{Section, dot};
 use crate::optimize::Loss;
@@ -112,15 +111,16 @@ fn descent_of(
     let signals = stream.signals();
     let places = Places::new(point);
     let injections = injections(point, table, index, signals, &places);
-    let mut back = Back::new(point, &places, signals.len, experiment.warmup);
+    let forgets = forgets(point, table, index);
+    let mut back = Back::new(point, &places, signals.len, (experiment.warmup, forgets));
     for (trace, residuals) in blocks.iter().rev() {
         back.run(trace, residuals);
     }
     for Injection { unknown, place, signal, factor } in injections {
         descent[unknown] += factor * back.met[(place, signal)];
     }
-    for (unknown, sensitivity) in table.range(Group::State { experiment: index }).zip(back.start) {
-        descent[unknown] += sensitivity;
+    for (unknown, state, change) in starts(table, index) {
+        descent[unknown] += change * back.start[state];
     }
     Ok((descent, cost))
 }
@@ -165,6 +165,8 @@ struct Back<'a> {
     sensed: Vec<usize>,
     places: &'a Places,
     warmup: usize,
+    /// Whether what was before the end of the warm-up is forgotten.
+    forgets: bool,
     /// Of the state behind the sample.
     x: Vec<f64>,
     /// Of what each effect of the output stage holds.
@@ -178,7 +180,12 @@ struct Back<'a> {
 }
 
 impl<'a> Back<'a> {
-    fn new(point: &'a Point, places: &'a Places, signals: usize, warmup: usize) -> Self {
+    fn new(
+        point: &'a Point,
+        places: &'a Places,
+        signals: usize,
+        (warmup, forgets): (usize, bool),
+    ) -> Self {
         let dynamics = &point.dynamics;
         let loops: Vec<&InnerLoop> = point.loops().collect();
         let sections = point.sections();
@@ -198,6 +205,7 @@ impl<'a> Back<'a> {
             sensed,
             places,
             warmup,
+            forgets,
             x: vec![0.0; point.order()],
             start: vec![0.0; point.order()],
             met: Matrix::zeros(places.len, signals),
@@ -224,9 +232,14 @@ impl<'a> Back<'a> {
             let sample = trace.samples.start + k;
             if sample == self.warmup {
                 self.start.clone_from(&self.x);
+                if self.forgets {
+                    self.x.fill(0.0);
+                }
             }
             if sample == 0 {
-                self.stand(work);
+                let mut standing = DVector::zeros(self.places.len);
+                self.stand(standing.as_mut_slice());
+                self.met.ger(1.0, &standing, &DVector::from_column_slice(&trace.standing), 1.0);
             }
         }
         let len = self.met.ncols();

@@ -110,6 +110,7 @@ impl<'a> Forward<'a> {
         let Signals { columns, readings, states, loops, len, ahead, .. } = &self.signals;
         let mut trace = Trace {
             signals: vec![0.0; len * block.len()],
+            standing: Vec::new(),
             samples: block,
             marks: Vec::new(),
             slopes: Vec::new(),
@@ -152,6 +153,8 @@ impl<'a> Forward<'a> {
             }
             if k == 0 {
                 self.motion.stand(&v);
+                trace.standing = signals.to_vec();
+                trace.standing[states.clone()].copy_from_slice(&self.motion.state);
             }
             if k == self.experiment.warmup && *has_unknown_state {
                 self.motion.state.iter_mut().zip(state.iter()).for_each(|(x, own)| *x += own);

@@ -27,7 +27,7 @@ use crate::effects::{InnerLoop, PlayCurves, Stage};
 use crate::linear::{Section, Sections};
 use crate::parallel::install;
 use crate::{Error, Experiment, Matrix, Model, Record};
-use nalgebra::RowDVector;
+use nalgebra::{DVector, RowDVector};
 use rayon::prelude::*;
 
 impl Point {
@@ -107,6 +107,35 @@ impl Point {
             motion.advance(at(k), at(k + 1));
         }
         Ok(displacement)
+    }
+
+    /// The state at the end of the warm-up of an experiment, before an unknown part is added.
+    fn arrival(&self, experiment: &Experiment, index: usize) -> DVector<f64> {
+        let count = experiment.warmup + 1;
+        let begin = Experiment {
+            input: experiment.input.rows(0, count).into_owned(),
+            output: experiment.output.rows(0, count).into_owned(),
+            covariates: experiment.covariates.rows(0, count).into_owned(),
+            warmup: 0,
+            held_out: Vec::new(),
+        };
+        let v = self.intermediate(&self.drive(&begin), &self.pasts[index]).transpose();
+        let at = |k: usize| v.column(k.saturating_sub(self.dynamics.delay)).data.into_slice();
+        let mut motion = Motion::new(self);
+        motion.stand(at(0));
+        (0..experiment.warmup).for_each(|k| motion.advance(at(k), at(k + 1)));
+        DVector::from_vec(motion.state)
+    }
+
+    /// Makes the initial states, which are those of another point of the same structure, the same as a whole: where the steady state
+    /// before the record has changed, their unknown parts change against it.
+    pub(crate) fn keep_whole_states(&mut self, before: &Self, record: &Record) {
+        for (index, experiment) in record.experiments().iter().enumerate() {
+            if self.pasts[index].has_unknown_state {
+                let change = before.arrival(experiment, index) - self.arrival(experiment, index);
+                self.pasts[index].state += change;
+            }
+        }
     }
 
     /// The loops that effects close around G.

@@ -32,6 +32,8 @@
 //! dd_oi/dc_oj = -q_j
 //! ```
 //!
+//! In delta form ([`super::table`]), the first unknown of a pair adds what it did and takes back what the second one adds.
+//!
 //! Sections in parallel with G have no held gain. Offsets and what is added behind the output stage have no place here
 //! (`Stream::added` gives their derivatives), nor have initial states, which start as a unit of one state.
 
@@ -150,9 +152,16 @@ pub(crate) fn injections(
             entries.around(unknown, &changes);
         }
     }
+    let mut found = entries.found;
+    for &[p, q] in table.pairs() {
+        let of_q = found.iter().filter(|one| one.unknown == q);
+        let against: Vec<Injection> =
+            of_q.map(|one| Injection { unknown: p, factor: -one.factor, ..*one }).collect();
+        found.extend(against);
+    }
     // tiles take them in the order of the unknowns
-    entries.found.sort_by_key(|one| one.unknown);
-    entries.found
+    found.sort_by_key(|one| one.unknown);
+    found
 }
 
 struct Entries<'a> {

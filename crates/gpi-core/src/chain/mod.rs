@@ -51,8 +51,6 @@
 //! - Derivatives of what loops see and drive by the unknowns of G and of the loops are differences of coefficients
 //!   ([`around_loops`]).
 //! - [`Stream::with_memory`](stream::Stream::with_memory) leaves out what has decayed.
-//! - The steady state before the record contains no loop. Its derivatives by what a loop drives do: they contain
-//!   `(I - A)^-1 w(0)`, which is an error where w(0) is not zero, and decays with the dynamics ([`tangents`]).
 //! - What a backlash holds before it first slides is taken as independent of the unknowns ([`sensing`]).
 
 pub(crate) mod adjoint;

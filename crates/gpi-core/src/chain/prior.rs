@@ -49,13 +49,16 @@ pub(crate) struct PriorPart {
 impl PriorPart {
     /// x' K x for the unknowns of a table.
     pub(crate) fn square(&self, values: &[f64]) -> f64 {
-        let own = self.own(values);
-        (&self.matrix * &own).dot(&own)
+        square(&self.matrix, &own(&self.places, values))
     }
+}
 
-    fn own(&self, values: &[f64]) -> DVector<f64> {
-        DVector::from_iterator(self.places.len(), self.places.iter().map(|&place| values[place]))
-    }
+fn own(places: &[usize], values: &[f64]) -> DVector<f64> {
+    DVector::from_iterator(places.len(), places.iter().map(|&place| values[place]))
+}
+
+fn square(matrix: &Matrix, values: &DVector<f64>) -> f64 {
+    (matrix * values).dot(values)
 }
 
 impl Point {
@@ -89,13 +92,15 @@ impl Point {
         self.channels.iter().any(|channel| !channel.prior.is_none())
     }
 
-    /// The unknown initial states of each experiment, where an output stage may hide them.
-    fn hidden_states(&self, table: &Table) -> Vec<Vec<usize>> {
-        if !self.senses() {
-            return Vec::new();
-        }
-        let of = |experiment| table.range(Group::State { experiment }).collect();
-        (0..self.pasts.len()).map(of).collect()
+    /// The unknown initial states of each experiment, where an output stage may hide them, and the matrix of `f |x|^2`.
+    fn hidden_states(&self, table: &Table) -> Vec<(Vec<usize>, Matrix)> {
+        let experiments = if self.senses() { self.pasts.len() } else { 0 };
+        let of = |experiment| {
+            let range = table.range(Group::State { experiment });
+            let states = table.coefficients(&range);
+            (range.collect(), STATES * states.tr_mul(&states))
+        };
+        (0..experiments).map(of).collect()
     }
 
     /// What the prior adds to the cost.
@@ -104,8 +109,9 @@ impl Point {
             return 0.0;
         }
         let values = table.values(self);
-        let hidden = self.hidden_states(table).into_iter().flatten();
-        let states: f64 = hidden.map(|place| STATES * values[place].powi(2)).sum();
+        let hidden = self.hidden_states(table).into_iter();
+        let states: f64 =
+            hidden.map(|(places, matrix)| square(&matrix, &own(&places, &values))).sum();
         let parts = self.prior(table);
         states + parts.iter().map(|part| part.factor * part.square(&values)).sum::<f64>()
     }
@@ -117,12 +123,14 @@ impl Point {
         }
         let values = table.values(self);
         let mut penalty = 0.0;
-        for place in self.hidden_states(table).into_iter().flatten() {
-            descent[place] -= STATES * values[place];
-            penalty += STATES * values[place].powi(2);
+        for (places, matrix) in self.hidden_states(table) {
+            let states = own(&places, &values);
+            let product = &matrix * &states;
+            places.iter().zip(product.iter()).for_each(|(&place, value)| descent[place] -= value);
+            penalty += product.dot(&states);
         }
         for part in self.prior(table) {
-            let product = &part.matrix * part.own(&values);
+            let product = &part.matrix * own(&part.places, &values);
             for (&place, value) in part.places.iter().zip(product.iter()) {
                 descent[place] -= part.factor * value;
             }
@@ -134,8 +142,8 @@ impl Point {
     /// Adds the prior to a Gram matrix.
     pub(crate) fn curve(&self, table: &Table, gram: &mut Arrow) {
         add_prior(&self.prior(table), gram);
-        for states in self.hidden_states(table) {
-            gram.add_part(&(STATES * Matrix::identity(states.len(), states.len())), &states);
+        for (places, matrix) in self.hidden_states(table) {
+            gram.add_part(&matrix, &places);
         }
     }
 }

@@ -189,3 +189,116 @@ fn begins(trace: &Trace, next: &mut Option<usize>) -> Vec<usize> {
     };
     trace.scored.iter().enumerate().filter(is_new).map(|(place, _)| place).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::hysteresis::Parameters;
+    use crate::chain::point::{DynamicsFreedom, Freedom};
+    use crate::effects::{Drives, InnerLoop, Law, Sees, Stiffness};
+    use crate::fit::preparation::Prepared;
+    use crate::linear::StateSpace;
+    use crate::operators::{Deadzones, Gpi, PlayBank, Reading};
+    use crate::optimize::Bounds;
+    use crate::{Channel, Model, Record};
+    use nalgebra::DVector;
+
+    /// Poles at 0.9995 and 0.9, with a spring and a damping that depend on the displacement and its speed, around which something goes
+    /// from the first sample on.
+    fn slow() -> (Model, Record) {
+        let linear = StateSpace::new(
+            Matrix::from_row_slice(2, 2, &[1.8995, 1.0, -0.89955, 0.0]),
+            Matrix::from_column_slice(2, 1, &[2e-4, 3e-4]),
+            Matrix::from_row_slice(1, 2, &[1.0, 0.0]),
+            Matrix::zeros(1, 1),
+        );
+        let zones = Deadzones::new(vec![0.0, 0.4], vec![1.0, 0.3], Reading::OneSided);
+        let plays = PlayBank::new(vec![0.0, 0.3], vec![0.8, 0.4]).unwrap();
+        let (sees, force) = (Sees::Output(0), |force| Drives::Input { input: 0, force, states: 2 });
+        let cubic = Law::Power { exponent: 3, scale: 2.0 };
+        let loops = vec![
+            InnerLoop { sees: sees.clone(), law: cubic, drives: force(0.02) },
+            InnerLoop { sees: sees.clone(), law: Law::Damping { scale: 0.2 }, drives: force(0.03) },
+            InnerLoop {
+                sees,
+                law: Law::Power { exponent: 2, scale: 2.0 },
+                drives: Drives::States(vec![-2e-6, 1e-6]),
+            },
+        ];
+        let (u, y) = (vec![Channel::new("u", "")], vec![Channel::new("y", "")]);
+        let hysteresis = vec![Gpi::new(zones.unwrap(), plays)];
+        let model = Model::new(100.0, u.clone(), y.clone(), hysteresis, linear.unwrap(), vec![0.0]);
+        let model = model.and_then(|model| model.with_effects(vec![Stiffness { loops }.into()]));
+        let run = Experiment {
+            input: Matrix::from_fn(500, 1, |k, _| 1.0 + (0.05 * k as f64 + 1.0).sin()),
+            output: Matrix::from_fn(500, 1, |k, _| 1.5 - 0.001 * k as f64),
+            covariates: Matrix::zeros(500, 0),
+            warmup: 0,
+            held_out: vec![],
+        };
+        (model.unwrap(), Record::new(vec![run], 100.0, u, y, vec![]).unwrap())
+    }
+
+    /// What is before the end of a warm-up is before the first sample, or in the record.
+    #[test]
+    fn derivatives_of_a_slow_plant_that_begins_in_motion_are_those_of_differences() {
+        let (model, record) = slow();
+        let channels: Vec<_> = model.hysteresis().iter().map(Parameters::from_operator).collect();
+        let prepared = Prepared::scoring_all(&record, channels).unwrap();
+        for (growth, warmup) in [(1.0, 0), (1.01, 0), (1.01, 20)] {
+            let mut point = prepared.point_of(&model).unwrap();
+            point.dynamics.sections.iter_mut().for_each(|section| section.growth = growth);
+            point.dynamics.held = vec![None];
+            point.pasts[0].state.iter_mut().zip([0.7, -0.65]).for_each(|(x, own)| *x = own);
+            let mut run = prepared.record.experiments()[0].clone();
+            run.warmup = warmup;
+            compare(&point, &prepared.record.with_experiments(vec![run]).unwrap());
+        }
+    }
+
+    /// All columns in both forms of the table with central differences of the simulation.
+    fn compare(point: &Point, record: &Record) {
+        let derivatives = Derivatives { thresholds: true, half_widths: true, starts: true };
+        let freedom = Freedom {
+            weights: true,
+            offsets: true,
+            derivatives,
+            states: true,
+            identity: true,
+            dynamics: DynamicsFreedom::Everything,
+        };
+        let plain = Table::new(point, freedom);
+        let solved = plain.clone().for_solver(point, &Bounds::none(plain.len));
+        assert!(solved.pairs().len() == 4 && solved.has_whole_states());
+        for table in [plain, solved] {
+            let experiment = &record.experiments()[0];
+            let mut found = Matrix::zeros(0, table.len);
+            let mut stream = Stream::new(point, &table, derivatives, experiment, 0).unwrap();
+            let mut add = |rows: Rows| {
+                let (first, count) = (found.nrows(), rows.residuals.ncols());
+                found.resize_vertically_mut(first + count, 0.0);
+                found.rows_mut(first, count).copy_from(&rows.regressors[0].transpose());
+                Ok(())
+            };
+            stream.run(&mut add).unwrap();
+            let names = table.names(point, record);
+            for unknown in point.bounds(&table, record, freedom).estimated() {
+                let column = found.column(unknown);
+                let size = (1e-5 / column.amax()).min(1e-4);
+                let mut step = DVector::zeros(table.len);
+                let mut moved = |by: f64| {
+                    step[unknown] = by;
+                    let mut moved = point.moved(&step, &table);
+                    if table.has_whole_states() {
+                        moved.keep_whole_states(point, record);
+                    }
+                    let residuals = moved.residuals(record).unwrap().remove(0);
+                    residuals.rows(experiment.warmup, found.nrows()).into_owned()
+                };
+                let difference = (moved(-size) - moved(size)) / (2.0 * size);
+                let error = (difference - column).amax() / column.amax();
+                assert!(error < 1e-4, "{}: {error}", names[unknown]);
+            }
+        }
+    }
+}

@@ -16,9 +16,32 @@
 //!
 //! The first two act on steps beyond the bounds or the region of stability only. The third is smooth, and the
 //! derivatives of [`super::injections`] contain it.
+//!
+//! # Delta form
+//!
+//! Two coefficients of a polynomial `.. + p z + q` of poles near one hardly differ in what they do: of their derivatives, all but a part
+//! of the size of `|pole - 1|` is common, and a Gram matrix, which squares that part, loses it to rounding. A table in delta form has the
+//! coefficients of powers of z - 1 as its unknowns instead,
+//!
+//! ```text
+//! p z + q = p (z - 1) + (p + q)       d/dp -> d/dp - d/dq       d/d(p + q) = d/dq
+//! ```
+//!
+//! and the difference is taken where the change enters the chain ([`super::injections`]), before anything is rounded. Source: R. H.
+//! Middleton and G. C. Goodwin, Digital Control and Estimation: A Unified Approach, 1990.
+//!
+//! # Whole states
+//!
+//! An unknown initial state is the difference of the state x at the end of the warm-up from what a steady state before the record has become
+//! by then. With loops around G, this steady state is none, because nothing goes around them in it, and where G nearly integrates, it is
+//! far away and depends strongly on the coefficients: a step of these would be a long way from linear. A solver therefore has x as a whole
+//! among its unknowns there: coefficients change nothing of x, and behind a step the differences are set so that it is true
+//! ([`Point::keep_whole_states`]).
 
 use super::group::{Group, groups};
 use super::point::{Freedom, Point};
+use crate::Matrix;
+use crate::optimize::{Bounds, Linearization};
 use nalgebra::DVector;
 use std::ops::Range;
 
@@ -30,8 +53,10 @@ pub(crate) struct Table {
     has_loops: bool,
     /// Whether a gap may hold a reading.
     has_gaps: bool,
-    /// Unknowns that are the coefficients of z^1 and z^0 of a polynomial of a section.
+    /// Pairs of unknowns that are coefficients of powers of z - 1.
     pairs: Vec<[usize; 2]>,
+    /// Whether unknown initial states are whole states.
+    has_whole_states: bool,
     /// How many unknowns there are.
     pub len: usize,
 }
@@ -47,10 +72,20 @@ impl Table {
             (group, first..len)
         };
         let rows: Vec<_> = free.map(row).collect();
-        let pairs =
-            rows.iter().flat_map(|(group, range)| group.pairs(point, range.start)).collect();
         let (has_loops, has_gaps) = (point.loops().next().is_some(), !point.gapped().is_empty());
-        Self { rows, has_loops, has_gaps, pairs, len }
+        let (pairs, has_whole_states) = (Vec::new(), false);
+        Self { rows, has_loops, has_gaps, pairs, has_whole_states, len }
+    }
+
+    /// The same with unknowns as a solver needs them: in delta form, but for those that have a bound, and with whole states where loops
+    /// are closed.
+    pub(crate) fn for_solver(mut self, point: &Point, bounds: &Bounds) -> Self {
+        let is_free = |&i: &usize| bounds.lower[i].is_infinite() && bounds.upper[i].is_infinite();
+        let rows = self.rows.iter();
+        let pairs = rows.flat_map(|(group, range)| group.pairs(point, range.start));
+        self.pairs = pairs.filter(|pair| pair.iter().all(is_free)).collect();
+        self.has_whole_states = self.has_loops;
+        self
     }
 
     /// All rows in the order of the unknowns.
@@ -73,8 +108,12 @@ impl Table {
             places.extend(range.clone());
         }
         let len = places.len();
-        let Self { has_loops, has_gaps, .. } = *self;
-        (Self { rows, has_loops, has_gaps, pairs: Vec::new(), len }, places)
+        let Self { has_loops, has_gaps, has_whole_states, .. } = *self;
+        let own = |[p, q]: &[usize; 2]| {
+            Some([places.binary_search(p).ok()?, places.binary_search(q).ok()?])
+        };
+        let pairs = self.pairs.iter().filter_map(own).collect();
+        (Self { rows, has_loops, has_gaps, pairs, has_whole_states, len }, places)
     }
 
     /// The unknowns of each experiment that move no other one's output. The only experiment has none: nothing else
@@ -108,14 +147,40 @@ impl Table {
         }
     }
 
-    /// Pairs of unknowns p and q of a polynomial `.. + p z + q`.
+    /// Pairs of unknowns that are the coefficients p and p + q of `p z + q = p (z - 1) + (p + q)`.
     pub(crate) fn pairs(&self) -> &[[usize; 2]] {
         &self.pairs
     }
 
+    /// Whether the unknown initial states of experiments are whole states.
+    pub(crate) fn has_whole_states(&self) -> bool {
+        self.has_whole_states
+    }
+
     /// The value of every unknown.
     pub(crate) fn values(&self, point: &Point) -> Vec<f64> {
-        self.rows.iter().flat_map(|(group, _)| group.read(point)).collect()
+        let mut values: Vec<f64> =
+            self.rows.iter().flat_map(|(group, _)| group.read(point)).collect();
+        self.pairs.iter().for_each(|&[p, q]| values[q] += values[p]);
+        values
+    }
+
+    /// What some unknowns are multiplied by for the coefficients of powers of z.
+    pub(crate) fn coefficients(&self, range: &Range<usize>) -> Matrix {
+        let mut matrix = Matrix::identity(range.len(), range.len());
+        for [p, q] in self.pairs.iter().filter(|[p, _]| range.contains(p)) {
+            matrix[(q - range.start, p - range.start)] = -1.0;
+        }
+        matrix
+    }
+
+    /// A quadratic model in delta form as one of the coefficients of powers of z, and the table of these.
+    pub(crate) fn undo_delta_form(mut self, model: &mut Linearization) -> Self {
+        for [p, q] in self.pairs.drain(..) {
+            model.gram.join(p, q);
+            model.descent[p] += model.descent[q];
+        }
+        self
     }
 }
 
@@ -123,6 +188,8 @@ impl Point {
     /// The point one step away.
     pub(crate) fn moved(&self, step: &DVector<f64>, table: &Table) -> Self {
         let mut moved = self.clone();
+        let mut step = step.clone();
+        table.pairs.iter().for_each(|&[p, q]| step[q] -= step[p]);
         for (group, range) in table.rows() {
             group.add(&mut moved, &step.as_slice()[range]);
         }
@@ -159,6 +226,8 @@ mod tests {
             dynamics: DynamicsFreedom::Everything,
         };
         let table = Table::new(&point, freedom);
+        let bounds = Bounds::none(table.len);
+        let table = table.for_solver(&point, &bounds);
         let names = table.names(&point, &record);
         let found: Vec<String> =
             table.pairs().iter().map(|[p, q]| format!("{} {}", names[*p], names[*q])).collect();
@@ -173,5 +242,11 @@ mod tests {
         wanted.extend(drives);
         wanted.push("start[0].state[0] start[0].state[1]".to_owned());
         assert_eq!(found, wanted);
+        // a bound is one of the coefficients of powers of z
+        let mut bounds = bounds;
+        let [p, q] = table.pairs()[1];
+        bounds.lower[q] = -0.3;
+        let others = table.clone().for_solver(&point, &bounds);
+        assert!(others.pairs().len() + 1 == wanted.len() && !others.pairs().contains(&[p, q]));
     }
 }

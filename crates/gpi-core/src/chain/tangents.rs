@@ -17,9 +17,9 @@
 //! of Bouc and Wen's force ([`super::loops`]), slopes of the output stage ([`super::sensing`]). dr are the injections at
 //! the half-widths of stops, at beta, gamma and n. At the first
 //! sample the state is the steady state of its injections, `dx = (I - A)^-1 (B dv + i_x)`, because the chain was at
-//! rest at its first v before the record. The unknown part of the initial state enters as `dx_j += 1` at the end of the
-//! warm-up. For the unknowns E_j of a loop, i_x is w(0) there, although the simulated steady state contains no `E w`:
-//! their derivatives are too large by the free response to `(I - A)^-1 i_x`, unless w(0) is zero.
+//! rest at its first v before the record. These injections are those of the steady state, `x = (I - A)^-1 B v` and w = 0, and not those
+//! of the first sample, where an unknown part of the initial state may have been added to x and w may not be zero. The unknown part
+//! enters as `dx_j += 1` at the end of the warm-up.
 //!
 //! Rows of C and S are read together, columns of B and E driven one after the other ([`Weights`]). Eight unknowns are
 //! one [`Tile`]: each number above is a vector of eight, so that the coefficients are loaded once for all of them. One
@@ -55,6 +55,8 @@ pub(crate) struct Trace {
     pub samples: Range<usize>,
     /// Columns of signals, one a sample.
     pub signals: Vec<f64>,
+    /// The column of the steady state before the first sample, in which nothing goes around loops; empty in later blocks.
+    pub standing: Vec<f64>,
     /// How changes pass each loop's law, loops one after the other, by samples.
     pub marks: Vec<f64>,
     /// How changes pass the effects of the output stage, by samples.
@@ -78,8 +80,9 @@ pub(crate) struct Tangents<'a> {
     sensed: Vec<usize>,
     signals: Signals,
     places: Places,
-    /// The sample before which the unknown part of the initial state is added.
+    /// The sample before which the unknown part of the initial state is added, and whether what was before it is forgotten.
     warmup: usize,
+    forgets: bool,
     tiles: Vec<Tile>,
 }
 
@@ -96,10 +99,10 @@ impl<'a> Tangents<'a> {
         let loops: Vec<&InnerLoop> = point.loops().collect();
         let sensed = sensed(point);
         let injections = injections(point, table, index, &signals, &places);
-        let starts = table.range(Group::State { experiment: index });
+        let starts = starts(table, index);
         let shape =
             Shape { places: &places, sections: &sections, loops: &loops, sensed: sensed.len() };
-        let tiles = tiles(&shape, injections, starts, table.len);
+        let tiles = tiles(&shape, injections, &starts, table.len);
         let between = Between::of_sections(dynamics, loops.iter().copied(), point.intersample);
         let order = point.order();
         let c = rows(&sections, dynamics.outputs());
@@ -128,6 +131,7 @@ impl<'a> Tangents<'a> {
             signals,
             places,
             warmup: experiment.warmup,
+            forgets: forgets(point, table, index),
             sections,
         }
     }
@@ -174,18 +178,18 @@ impl<'a> Tangents<'a> {
         let marks = trace.marks.len() / trace.samples.len();
         for k in 0..trace.samples.len() {
             let signals = &trace.signals[k * self.signals.len..(k + 1) * self.signals.len];
-            let work = &mut tile.work[..];
-            work.fill(NONE);
-            for Entry { place, signals: own, factors } in &tile.entries {
-                let change = std::array::from_fn(|lane| factors[lane] * signals[own[lane]]);
-                add(simd, &mut work[*place], 1.0, &change);
-            }
             let sample = trace.samples.start + k;
             if sample == 0 {
+                inject(simd, tile, &trace.standing);
                 self.stand(tile);
             }
+            inject(simd, tile, signals);
             if sample == self.warmup {
-                tile.starts.iter().for_each(|&(lane, state)| tile.x[state][lane] += 1.0);
+                if self.forgets {
+                    tile.x.fill(NONE);
+                }
+                let starts = tile.starts.iter();
+                starts.for_each(|&(lane, state, change)| tile.x[state][lane] += change);
             }
             let work = &mut tile.work[..];
             let x = &tile.x[tile.states.clone()];
@@ -273,6 +277,16 @@ impl<'a> Tangents<'a> {
     }
 }
 
+/// What the unknowns of a tile add at their places, and nothing else there.
+#[inline(always)]
+fn inject<S: Simd>(simd: S, tile: &mut Tile, signals: &[f64]) {
+    tile.work.fill(NONE);
+    for Entry { place, signals: own, factors } in &tile.entries {
+        let change = std::array::from_fn(|lane| factors[lane] * signals[own[lane]]);
+        add(simd, &mut tile.work[*place], 1.0, &change);
+    }
+}
+
 /// A tile and a block, for the widest vectors that the processor has.
 struct Advance<'a, 'b> {
     tangents: &'a Tangents<'b>,
@@ -288,6 +302,20 @@ impl pulp::WithSimd for Advance<'_, '_> {
         let Self { tangents, tile, trace } = self;
         tangents.advance(simd, tile, trace);
     }
+}
+
+/// Whether the state of an experiment at the end of its warm-up is an unknown as a whole, and depends on no other unknown.
+pub(super) fn forgets(point: &Point, table: &Table, experiment: usize) -> bool {
+    table.has_whole_states() && point.pasts[experiment].has_unknown_state
+}
+
+/// Changes of the state of an experiment at the end of its warm-up: the unknown, the state and its change.
+pub(super) fn starts(table: &Table, experiment: usize) -> Vec<(usize, usize, f64)> {
+    let own = table.range(Group::State { experiment });
+    let mut starts: Vec<_> = own.clone().zip(0..).map(|(unknown, j)| (unknown, j, 1.0)).collect();
+    let pairs = table.pairs().iter().filter(|[p, _]| own.contains(p));
+    starts.extend(pairs.map(|&[p, q]| (p, q - own.start, -1.0)));
+    starts
 }
 
 /// The output that each effect of the output stage acts on, in the order in which they act.

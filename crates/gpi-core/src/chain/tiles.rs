@@ -20,8 +20,8 @@ use std::ops::Range;
 pub(super) struct Tile {
     pub first: usize,
     pub entries: Vec<Entry>,
-    /// Unknowns that start as a state, and that state.
-    pub starts: Vec<(usize, usize)>,
+    /// Lanes of unknowns that change an initial state, that state and its change.
+    pub starts: Vec<(usize, usize, f64)>,
     /// Whether v changes.
     pub drives: bool,
     /// Sections and their states that change.
@@ -74,11 +74,11 @@ pub(super) struct Shape<'a> {
     pub sensed: usize,
 }
 
-/// The tiles of so many unknowns that have an injection, or are one of the initial states `starts`.
+/// The tiles of so many unknowns that have an injection, or change an initial state as `starts` says.
 pub(super) fn tiles(
     shape: &Shape,
     injections: Vec<Injection>,
-    starts: Range<usize>,
+    starts: &[(usize, usize, f64)],
     unknowns: usize,
 ) -> Vec<Tile> {
     let Shape { places, sections, loops, sensed } = shape;
@@ -87,17 +87,17 @@ pub(super) fn tiles(
         let own = first..unknowns.min(first + LANES);
         let injections: Vec<Injection> =
             std::iter::from_fn(|| all.next_if(|one| own.contains(&one.unknown))).collect();
-        let starts: Vec<(usize, usize)> = starts
-            .clone()
-            .filter(|unknown| own.contains(unknown))
-            .map(|unknown| (unknown - first, unknown - starts.start))
+        let starts: Vec<(usize, usize, f64)> = starts
+            .iter()
+            .filter(|(unknown, ..)| own.contains(unknown))
+            .map(|&(unknown, state, change)| (unknown - first, state, change))
             .collect();
         let drives = injections.iter().any(|one| places.v.contains(&one.place));
         // without a loop a section moves nothing but itself
         let everything = drives || !loops.is_empty();
         let entered = injections.iter().filter(|one| places.states.contains(&one.place));
         let entered = entered.map(|one| one.place - places.states.start);
-        let moved: Vec<usize> = entered.chain(starts.iter().map(|(_, state)| *state)).collect();
+        let moved: Vec<usize> = entered.chain(starts.iter().map(|(_, state, _)| *state)).collect();
         let (sections, states) = moving(sections, &moved, everything);
         Tile {
             first,

@@ -41,8 +41,9 @@ pub(crate) fn uncertainty(
 ) -> Result<Uncertainty, Error> {
     let settings = UncertaintySettings::default();
     settings.validate()?;
-    let Fitted { point, linearization, .. } = fitted;
-    let problem = Estimation::new(point, record, options.freedom, &options.loss);
+    let Fitted { point, linearization, table, .. } = fitted;
+    let (freedom, loss) = (options.freedom, &options.loss);
+    let problem = Estimation { record, freedom, loss, table: table.clone() };
     let mut weighted = options.loss.all_errors(&residuals);
     drop(residuals);
     let curvature = options.loss.curvature(scored(&weighted, record));

@@ -69,7 +69,8 @@ pub(crate) fn fit(
     phase: &str,
     progress: Progress,
 ) -> Result<Fitted, Error> {
-    let problem = Estimation::new(&point, record, options.freedom, &options.loss);
+    let problem =
+        Estimation::new(&point, record, options.freedom, &options.loss).for_solver(&point);
     let FitOptions { steps, gain, goal, .. } = *options;
     let settings = SolverSettings { steps, gain, goal, ..SolverSettings::default() };
     let mut check = |done: f64| report(progress, phase, done);
@@ -79,5 +80,6 @@ pub(crate) fn fit(
         // see `Loss::cost`
         linearization.cost = f64::INFINITY;
     }
-    Ok(Fitted { point, linearization, table: problem.table, history, status })
+    let table = problem.table.undo_delta_form(&mut linearization);
+    Ok(Fitted { point, linearization, table, history, status })
 }

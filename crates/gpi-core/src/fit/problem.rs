@@ -48,6 +48,13 @@ impl<'a> Estimation<'a> {
     pub(crate) fn new(point: &Point, record: &'a Record, freedom: Freedom, loss: &'a Loss) -> Self {
         Self { record, freedom, loss, table: Table::new(point, freedom) }
     }
+
+    /// The same problem with unknowns as a solver needs them.
+    pub(crate) fn for_solver(mut self, point: &Point) -> Self {
+        let bounds = self.bounds(point);
+        self.table = self.table.for_solver(point, &bounds);
+        self
+    }
 }
 
 impl LeastSquares for Estimation<'_> {
@@ -111,15 +118,15 @@ impl LeastSquares for Estimation<'_> {
     }
 
     fn step(&self, point: &Point, step: &DVector<f64>) -> Point {
-        point.moved(step, &self.table)
+        let mut moved = point.moved(step, &self.table);
+        if self.table.has_whole_states() {
+            moved.keep_whole_states(point, self.record);
+        }
+        moved
     }
 
     fn is_linear(&self, unknown: usize) -> bool {
         self.table.is_linear(unknown)
-    }
-
-    fn pairs(&self) -> &[[usize; 2]] {
-        self.table.pairs()
     }
 
     /// What rounding leaves of the outputs' squares.
@@ -215,8 +222,33 @@ mod tests {
         let problem = Estimation::new(point, record, freedom, loss);
         let all = problem.linearize(point, &mut check).unwrap();
         let (found, cost) = problem.gradient(point, &mut check).unwrap();
-        let expected = &all.descent;
         assert!((problem.evaluate(point).unwrap() / all.cost - 1.0).abs() < 1e-12);
+        compare_gradients(&all, &found, cost);
+        // as a solver needs them: all coefficients of sections of two poles, and what loops drive and begin with
+        let problem = problem.for_solver(point);
+        let mut all = problem.linearize(point, &mut check).unwrap();
+        let (found, cost) = problem.gradient(point, &mut check).unwrap();
+        compare_gradients(&all, &found, cost);
+        assert!(problem.table.pairs().len() > 3);
+        let step = DVector::from_fn(found.len(), |i, _| 1e-3 * (i as f64).sin());
+        let values = |point: &Point| DVector::from_vec(problem.table.values(point));
+        let difference = values(&point.moved(&step, &problem.table)) - values(point);
+        for &i in problem.table.pairs().iter().flatten() {
+            assert!((difference[i] - step[i]).abs() < 1e-13);
+        }
+        // back to the coefficients of powers of z
+        let table = problem.table.clone().undo_delta_form(&mut all);
+        assert!(table.pairs().is_empty());
+        let same = Estimation { table, ..problem }.linearize(point, &mut check).unwrap();
+        let scale = all.gram.diagonal().map(f64::sqrt);
+        let [one, other] = [&all, &same].map(|own| own.gram.scaled(&scale).to_dense());
+        assert!((one - other).amax() < 1e-12);
+        let descent = (all.descent - same.descent).component_div(&scale);
+        assert!(descent.amax() < 1e-11 * all.cost.sqrt());
+    }
+
+    fn compare_gradients(all: &Linearization, found: &DVector<f64>, cost: f64) {
+        let expected = &all.descent;
         assert!((cost / all.cost - 1.0).abs() < 1e-12);
         assert!(
             expected.iter().filter(|value| value.abs() > 1e-6).count() > expected.len() * 9 / 10

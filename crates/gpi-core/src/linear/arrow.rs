@@ -173,6 +173,32 @@ impl Arrow {
         }
     }
 
+    /// Adds row q to row p and column q to column p, of two shared unknowns or two of one group: `T' A T` of the
+    /// unit matrix T with a one at (q, p).
+    pub(crate) fn join(&mut self, p: usize, q: usize) {
+        let ((group, p), (other, q)) = (self.places[p], self.places[q]);
+        debug_assert_eq!(group, other);
+        let block = group.map_or(&mut self.head, |group| &mut self.groups[group].own);
+        for i in 0..block.ncols() {
+            block[(p, i)] += block[(q, i)];
+        }
+        for i in 0..block.nrows() {
+            block[(i, p)] += block[(i, q)];
+        }
+        let add_columns = |coupling: &mut Matrix| {
+            for i in 0..coupling.nrows() {
+                coupling[(i, p)] += coupling[(i, q)];
+            }
+        };
+        let Some(group) = group else {
+            return self.groups.iter_mut().for_each(|group| add_columns(&mut group.coupling));
+        };
+        let coupling = &mut self.groups[group].coupling;
+        for i in 0..coupling.ncols() {
+            coupling[(p, i)] += coupling[(q, i)];
+        }
+    }
+
     /// Element (i, j) over `scale[i] scale[j]`.
     pub(crate) fn scaled(&self, scale: &Vector) -> Self {
         let mut scaled = self.clone();

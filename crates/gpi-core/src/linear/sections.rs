@@ -71,7 +71,9 @@ impl Sections {
             first += order;
         }
         let d = system.d().view((0, 0), (outputs, inputs)).into_owned();
-        let held = vec![Some((0, 0.0)); inputs];
+        // the output of a mass answers later
+        let is_delayed = |input: usize| d.column(input).iter().all(|value| *value == 0.0);
+        let held = (0..inputs).map(|input| (!is_delayed(input)).then_some((0, 0.0))).collect();
         Ok((Self { delay, sections, d, held }.holding_present_gain(), e, s))
     }
 

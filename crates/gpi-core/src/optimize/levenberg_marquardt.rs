@@ -1,7 +1,6 @@
 //! Gauss-Newton steps with Levenberg's and Marquardt's damping, within bounds.
 
 use super::{LeastSquares, Linearization, SolverSettings};
-use crate::Matrix;
 use crate::linear::{Arrow, bounded};
 
 /// How a fit ended.
@@ -121,9 +120,7 @@ pub(crate) fn levenberg_marquardt<L: LeastSquares>(
     Ok(Minimum { point, linearization: current, history, status })
 }
 
-/// The Gram matrix with damping: `damping diag(gram)` is added. Two coefficients of a polynomial `.. + p z + q` of poles near one hardly
-/// differ in what they do, so that a step along which they act against each other would be damped most. They are
-/// damped as coefficients of z - 1 instead: with `p z + q = p (z - 1) + (p + q)`, a step of p alone is one of (p, q) = (1, -1).
+/// The Gram matrix with damping: `damping diag(gram)` is added, but for unknowns in which the residuals are linear.
 fn damped<L: LeastSquares>(current: &Linearization, problem: &L, damping: f64) -> Arrow {
     let mut gram = current.gram.clone();
     let is_damped = |i: &usize| current.is_approximate() || !problem.is_linear(*i);
@@ -132,11 +129,5 @@ fn damped<L: LeastSquares>(current: &Linearization, problem: &L, damping: f64) -
         diagonal[i] *= 1.0 + damping;
     }
     gram.set_diagonal(&diagonal);
-    for &[p, q] in problem.pairs().iter().filter(|[p, q]| is_damped(p) && is_damped(q)) {
-        let [pp, pq, qq] = [(p, p), (p, q), (q, q)].map(|(i, j)| current.gram.get(i, j));
-        let against = (pp - 2.0 * pq + qq).max(0.0);
-        let more = Matrix::from_row_slice(2, 2, &[against + qq - pp, qq, qq, 0.0]);
-        gram.add_part(&(damping * more), &[p, q]);
-    }
     gram
 }

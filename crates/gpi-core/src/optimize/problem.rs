@@ -72,11 +72,6 @@ pub(crate) trait LeastSquares {
     /// Whether the residuals are linear in an unknown while all others are kept: its step needs no damping.
     fn is_linear(&self, unknown: usize) -> bool;
 
-    /// Pairs of unknowns p and q of a polynomial `.. + p z + q` of z near one.
-    fn pairs(&self) -> &[[usize; 2]] {
-        &[]
-    }
-
     /// A cost that consists of rounding errors alone.
     fn rounding(&self) -> f64;
 }
