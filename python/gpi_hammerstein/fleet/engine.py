@@ -211,7 +211,8 @@ class _stopped:  # noqa: N801  a context manager, used as a function
         return self.pool
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self.pool.shutdown(wait=kind is None, cancel_futures=True)
         if kind is not None:
             for process in set(multiprocessing.active_children()) - self.before:
                 process.terminate()
+        # waiting also ends the pool's own thread, which else may write to a closed pipe while the interpreter ends
+        self.pool.shutdown(cancel_futures=True)
