@@ -214,5 +214,5 @@ class _stopped:  # noqa: N801  a context manager, used as a function
         if kind is not None:
             for process in set(multiprocessing.active_children()) - self.before:
                 process.terminate()
-        # waiting also ends the pool's own thread, which else may write to a closed pipe while the interpreter ends
+        # waiting also ends the pool's own thread, which else may write to a closed pipe at exit
         self.pool.shutdown(cancel_futures=True)
