@@ -25,7 +25,7 @@
 //! 5'  (zbar, rbar) = law'^T wbar                      rbar: half-widths of stops, beta, gamma, n
 //! 4'  l    += S' zbar,   vbar += T' zbar
 //! 3'  l    += C' ybar,   vbar += D' ybar
-//! 2'  bar of x_0 = l                                  at the end of the warm-up only
+//! 2'  bar of x_0 = l                                  at the end of the warm-up only; then l = 0 if x is an unknown as a whole
 //! 1'  m = (I - A)^-T l,   xbar += m,   vbar += B' m   at the first sample only
 //! ```
 //!

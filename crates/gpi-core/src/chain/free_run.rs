@@ -127,8 +127,8 @@ impl Point {
         DVector::from_vec(motion.state)
     }
 
-    /// Makes the initial states, which are those of another point of the same structure, the same as a whole: where the steady state
-    /// before the record has changed, their unknown parts change against it.
+    /// Keeps the initial states of all experiments as they are in a point of the same structure from which a step has led here. A change of
+    /// what the steady state has become at the end of the warm-up is subtracted from the unknown part.
     pub(crate) fn keep_whole_states(&mut self, before: &Self, record: &Record) {
         for (index, experiment) in record.experiments().iter().enumerate() {
             if self.pasts[index].has_unknown_state {

@@ -35,7 +35,8 @@ pub struct Sensitivities {
 /// so for records that fit into memory as many times as there are parameters.
 ///
 /// G is held to its DC gain: where `section[i]` or `feedthrough` change, the element of D that belongs to
-/// the largest DC gain of the input makes up for it.
+/// the largest DC gain of the input makes up for it. If forces act inside the mechanics and all elements of D of an input are zero,
+/// they stay zero, and the first weight of this input is held instead.
 ///
 /// # Errors
 /// As for [`refine`](crate::identify::refine).

@@ -71,7 +71,7 @@ impl Sections {
             first += order;
         }
         let d = system.d().view((0, 0), (outputs, inputs)).into_owned();
-        // the output of a mass answers later
+        // a feedthrough of zero stays zero: the output of a mass answers its input one sample later
         let is_delayed = |input: usize| d.column(input).iter().all(|value| *value == 0.0);
         let held = (0..inputs).map(|input| (!is_delayed(input)).then_some((0, 0.0))).collect();
         Ok((Self { delay, sections, d, held }.holding_present_gain(), e, s))
