@@ -185,4 +185,6 @@ def test_the_friction_of_a_measured_drive_is_that_of_the_literature() -> None:
     newtons_per_volt = 35.15
     for name, known in (("mass", 94.7), ("damping", 200.0), ("friction_force", 20.8)):
         assert abs(newtons_per_volt * size[name] / known - 1.0) < 0.05, name
-    assert json.loads(found.model.to_json())["effects"][0]["name"] == "friction"
+    # in m, from its start to its end, and over horizons of a second
+    assert found.model.on_another_record(record)["error"]["rms"] < 1.7e-3
+    assert found.model.over_horizons(record, 1.0)["rms"] < 0.55e-3

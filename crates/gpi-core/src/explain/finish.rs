@@ -3,6 +3,7 @@
 use super::policy::FitPolicy;
 use super::search::drop_impossible;
 use super::state::SearchState;
+use super::stretches::in_stretches;
 use crate::Error;
 use crate::effects::Entry;
 use crate::fit::RefineOptions;
@@ -10,7 +11,7 @@ use crate::fit::joint::{Refined, fit_options};
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::identify::{Progress, Refinement};
 
-/// Refines everything once more, grids that were not given included, and estimates the parameters' uncertainty. An effect that this fit
+/// Refines everything once more, a stage that integrates forces in stretches, grids that were not given included, and estimates the parameters' uncertainty. An effect that this fit
 /// makes impossible was none, unless it is required: the rest is then refined without it.
 pub(super) fn finish(
     state: &mut SearchState,
@@ -19,7 +20,11 @@ pub(super) fn finish(
     progress: Progress,
 ) -> Result<Refinement, Error> {
     let (fitted, options) = loop {
-        let (fitted, options) = refined(state, interrupted, progress)?;
+        let own = if interrupted { None } else { in_stretches(state, progress)? };
+        let (fitted, options) = match own {
+            Some(own) => own,
+            None => refined(state, interrupted, progress)?,
+        };
         state.point = fitted.point.clone();
         if interrupted || !drop_impossible(state, required, progress)? {
             break (fitted, options);

@@ -102,6 +102,12 @@ impl Balance {
         self.solutions[1][UNFORCED - 1]
     }
 
+    /// The time constant m/c of the speed, in samples.
+    pub(super) fn time_constant(&self) -> f64 {
+        let [_, damping, mass] = self.mechanics;
+        mass / damping
+    }
+
     /// The linear mechanics behind an input of so much gain that is held between samples; `growth` as in [`Section::growth`].
     pub(super) fn dynamics(&self, gain: f64, delay: usize, growth: f64) -> Result<Sections, Error> {
         let [k, c, m] = self.mechanics;

@@ -5,24 +5,22 @@
 //! about its cause. The balance ([`super::force_balance`]) needs neither: mass, damping, stiffness and forces follow from it at once, and a fit
 //! begins there, without plays and deadzones.
 
-use super::force_balance::{Balance, balance, squares};
+use super::balance_start::{Straight, best, proposals};
+use super::force_balance::{balance, squares};
 use super::limits::limited;
 use super::outside::limits;
-use super::policy::BalancePolicy;
 use super::ranking::Ranked;
 use super::score::Score;
 use super::state::{SearchState, Trial};
+use super::stretches::held_out;
 use super::threshold::Significance;
+use crate::Error;
 use crate::chain::point::Point;
-use crate::effects::{
-    Drives, Effect, Entry, InnerLoop, OutputKind, PlaceMut, Proposal, Situation, Stage,
-};
+use crate::effects::{Effect, Entry, InnerLoop, Proposal, Stage};
 use crate::fit::initial_state::settled;
 use crate::fit::minimize::{FitOptions, Fitted};
 use crate::fit::preparation::rescale;
-use crate::linear::Sections;
 use crate::progress::Progress;
-use crate::{Error, Experiment, Matrix, Record};
 
 /// States of a mass.
 const MECHANICS: usize = 2;
@@ -54,12 +52,12 @@ pub(super) fn forces(
     if !is_single || !is_free || is_near || is_pointless {
         return Ok(Vec::new());
     }
-    let straight = state.point.without_hysteresis(record);
-    let (delay, gain) = (straight.dynamics.delay, straight.channels[0].slope());
-    let growth = (policy.balance.slowest / record.scored() as f64).exp();
-    let dynamics = |own: &Balance| own.dynamics(gain, delay, growth).ok();
-    let linear = balance(record, delay, &[], &policy.balance).filter(|_| gain != 0.0);
-    let Some(linear) = linear.as_ref().and_then(dynamics) else { return Ok(Vec::new()) };
+    let Some(straight) = Straight::of(state, &state.point) else { return Ok(Vec::new()) };
+    let delay = straight.delay();
+    let linear = balance(record, delay, &[], &policy.balance);
+    let Some(linear) = linear.and_then(|own| straight.dynamics(&own)) else {
+        return Ok(Vec::new());
+    };
     let settle = |point: Point, name: &str, progress: Progress| {
         settled(point, &state.prepared.record, &state.setup.options, name, progress)
     };
@@ -75,21 +73,18 @@ pub(super) fn forces(
             // more limits of a model that has some are tried by the score test
             let ends = limits(record, 0, &policy.outside)?;
             if !state.has(entry) && !ends.is_empty() {
-                let point = begin(state, &straight, linear.clone(), None);
+                let point = straight.with(state, linear.clone(), None);
                 let point = settle(point, entry.name, progress)?;
                 found.extend(limited(state, &point, ends, entry, progress)?);
             }
             continue;
         }
-        let Some((own, mut effect)) = best(record, delay, proposals, &policy.balance) else {
+        let Some((own, effect)) = best(record, delay, proposals, &policy.balance) else {
             continue;
         };
-        let Some(dynamics) = dynamics(&own) else { continue };
-        let forces: Vec<f64> = own.forces.iter().map(|force| gain * force).collect();
-        set_forces(&mut effect, &forces, &dynamics);
-        let point = begin(state, &straight, dynamics, Some(effect.clone()));
+        let Some((point, effect)) = straight.at_balance(state, &own, effect) else { continue };
         let start = Some(settle(point, entry.name, progress)?);
-        let (columns, gain) = (forces.len(), own.explained);
+        let (columns, gain) = (own.forces.len(), own.explained);
         let score = Score { start: effect, zero: None, gain, columns };
         found.push(Ranked { entry, score, worth: gain, start, others: Vec::new() });
     }
@@ -135,15 +130,25 @@ pub(super) fn remember_out_of_reach(
     Ok(())
 }
 
-/// The squares of the balance of forces without an effect and with it: of the training data, and of each held-out block.
+/// What the balance of forces says of an effect inside the mechanics.
 pub(super) struct Balanced {
+    /// The squares of the balance without the effect and with it, of the training data.
     pub squares: [f64; 2],
+    /// The same of each held-out block.
     pub held_out: [Vec<f64>; 2],
+    /// Whether the held-out error of simulations over stretches of the record becomes larger, that over the whole record where it is too
+    /// short for stretches.
+    pub is_worse: bool,
 }
 
 /// What the balance says of a force inside the mechanics of a stage that integrates. A simulation adds up all forces that no model knows,
-/// and its error says little of one of them, unless the model is near the noise: then a force is judged by its error as any other effect.
-pub(super) fn balanced(state: &SearchState, trial: &Trial) -> Result<Option<Balanced>, Error> {
+/// and its error over a long record says little of one of them, unless the model is near the noise: then a force is judged by its error as any
+/// other effect.
+pub(super) fn balanced(
+    state: &SearchState,
+    trial: &Trial,
+    progress: Progress,
+) -> Result<Option<Balanced>, Error> {
     let point = &trial.point;
     let place = point.effects.iter().rposition(|effect| effect.name() == trial.entry.name);
     let closed = place.and_then(|place| point.effects[place].place().closed_loops());
@@ -155,81 +160,19 @@ pub(super) fn balanced(state: &SearchState, trial: &Trial) -> Result<Option<Bala
     }
     let (record, delay) = (&state.prepared.record, point.dynamics.delay);
     let found = balance(record, delay, closed.loops(), &state.setup.policy.balance);
-    Ok(found.map(|own| Balanced {
-        squares: squares(&own, record, delay, closed.loops()).map(|all| all.iter().sum()),
+    let Some(own) = found else { return Ok(None) };
+    let in_stretches = held_out(state, [&state.point, point], own.time_constant(), progress)?;
+    let [before, after] = match in_stretches {
+        Some(in_stretches) => in_stretches,
+        None => [sum(state.held_out(&state.point)?), sum(trial.held_out.clone())],
+    };
+    Ok(Some(Balanced {
+        squares: squares(&own, record, delay, closed.loops()).map(sum),
         held_out: squares(&own, &state.setup.test, delay, closed.loops()),
+        is_worse: after > before,
     }))
 }
 
-/// The balance with the block of an effect whose forces explain most, if that is enough, and the block.
-pub(super) fn best(
-    record: &Record,
-    delay: usize,
-    proposals: Vec<Proposal<Effect>>,
-    policy: &BalancePolicy,
-) -> Option<(Balance, Effect)> {
-    let of = |proposal: Proposal<Effect>| {
-        let loops = proposal.block.place().closed_loops()?.loops();
-        Some((balance(record, delay, loops, policy)?, proposal.block))
-    };
-    let better = |known: (Balance, Effect), next: (Balance, Effect)| {
-        if next.0.explained > known.0.explained { next } else { known }
-    };
-    let found = proposals.into_iter().filter_map(of).reduce(better);
-    found.filter(|(own, _)| own.explained >= policy.least)
-}
-
-/// Gives the loops of an effect their forces, in the unit of v. They enter where the input does.
-pub(super) fn set_forces(effect: &mut Effect, forces: &[f64], dynamics: &Sections) {
-    let PlaceMut::Loops(closed) = effect.place_mut() else { return };
-    for (inner, found) in closed.loops_mut().iter_mut().zip(forces) {
-        match &mut inner.drives {
-            Drives::States(column) => *column = dynamics.driven_by(0).map(|b| -found * b).collect(),
-            Drives::Input { force, .. } => *force = *found,
-        }
-    }
-}
-
-/// The present model with other dynamics and one more effect, if there is one, and without plays and deadzones.
-pub(super) fn begin(
-    state: &SearchState,
-    straight: &Point,
-    dynamics: Sections,
-    effect: Option<Effect>,
-) -> Point {
-    let mut point = state.prepared.point(dynamics);
-    point.channels.clone_from(&straight.channels);
-    state.prepared.settle(&mut point);
-    let effects = state.point.effects.iter().cloned().chain(effect);
-    let mut point = effects.fold(point, |point, effect| point.with_effect(effect));
-    rescale(&mut point);
-    point
-}
-
-/// The proposals of an effect for a mass of these dynamics that moves as measured.
-pub(super) fn proposals(
-    record: &Record,
-    dynamics: &Sections,
-    entry: &Entry,
-) -> Vec<Proposal<Effect>> {
-    let of = |signal: fn(&Experiment) -> &Matrix| -> Vec<Matrix> {
-        let scored = |experiment: &Experiment| {
-            let rows: Vec<usize> = experiment.scored_runs().flatten().collect();
-            signal(experiment).select_rows(&rows)
-        };
-        record.experiments().iter().map(scored).collect()
-    };
-    let (inputs, outputs) = (of(|own| &own.input), of(|own| &own.output));
-    (entry.proposals)(&Situation {
-        record,
-        drives: &inputs,
-        intermediates: &inputs,
-        displacements: &outputs,
-        residuals: &outputs,
-        dynamics,
-        loops: Vec::new(),
-        kind: OutputKind::Displacement,
-        widest: vec![0.0],
-        places: vec![Situation::range(&inputs, 0)],
-    })
+fn sum(squares: Vec<f64>) -> f64 {
+    squares.iter().sum()
 }

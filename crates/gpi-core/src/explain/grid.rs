@@ -50,7 +50,12 @@ impl Place {
 /// Moves half-widths and thresholds, and takes finer grids as long as they pay. Says whether the model became better.
 pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Result<bool, Error> {
     state.is_rich = true;
-    if !state.setup.moving.half_widths && !state.setup.moving.thresholds {
+    let is_held = !state.setup.moving.half_widths && !state.setup.moving.thresholds;
+    // a simulation adds up all forces that the model does not know, and plays would follow their sum
+    let adds_up = state.point.loops().next().is_some()
+        && state.integrates()?
+        && !state.is_near(&state.point)?;
+    if is_held || adds_up {
         return Ok(false);
     }
     let is_finer = add_places(state, progress)?;

@@ -59,6 +59,8 @@ pub(super) struct Evidence<'a> {
     pub is_added: bool,
     /// Whether it is an expansion in many terms, without a law of its own.
     pub is_expansion: bool,
+    /// Whether the balance of forces is what speaks for it.
+    pub is_balanced: bool,
     /// Whether the output integrates the input, and the error of a simulation is all that speaks for it.
     pub is_integrated: bool,
     /// Why its examination ended without a name, if so.
@@ -215,6 +217,7 @@ pub(super) mod tests {
             is_slow: false,
             is_added: false,
             is_expansion: false,
+            is_balanced: false,
             is_integrated: false,
             doubt: None,
         }

@@ -24,6 +24,7 @@
 //! `score`, `setup` (what never changes), `state` (where the search stands), `ranking`, `force_balance`, `forces`, `sensor_range`, `slow_candidate`, `trial`,
 //! `restart`, `moving`, `examination`, `grid`, `revision`, `round`, `slow_poles`, `pairs`, `sliding_mass`, `force_at_input`, `search`, `outside` (why the structure is wrong), `explanation`.
 
+mod balance_start;
 pub(crate) mod base;
 mod blocks;
 mod choice;
@@ -64,6 +65,7 @@ mod slow_candidate;
 mod slow_poles;
 mod state;
 mod steps;
+mod stretches;
 mod surpassing;
 mod threshold;
 mod trial;

@@ -31,7 +31,7 @@ pub(super) fn round(state: &mut SearchState, progress: Progress) -> Result<bool,
     let (mut trials, failed) = fitted(state, best, progress)?;
     let before = state.held_out(&state.point)?;
     begin_again(state, &mut trials, &before, progress)?;
-    let balanced = balance(state, &trials)?;
+    let balanced = balance(state, &trials, progress)?;
     let mut evidences = evidences(state, &trials, &before, &balanced)?;
     match examined(state, &trials, &mut evidences, progress)? {
         Found::FinerGrids => Ok(true),
@@ -99,6 +99,10 @@ fn fitted(
     // one that diverges on what is held out predicts nothing
     fits.retain(|trial| trial.held_out.iter().all(|squares| squares.is_finite()));
     fits.sort_by(|a, b| (b.deviance - b.threshold).total_cmp(&(a.deviance - a.threshold)));
+    if state.integrates()? && !state.is_near(&state.point)? {
+        // that which began at the balance of forces, whatever the squares
+        fits.sort_by_key(|trial| !trial.is_far);
+    }
     // of two fits of the same effect, the better one
     let mut names = BTreeSet::new();
     fits.retain(|trial| names.insert(trial.entry.name));
@@ -115,7 +119,7 @@ fn begin_again(
     if trials.iter().all(|trial| trial.others.is_empty()) {
         return Ok(());
     }
-    let balanced = balance(state, trials)?;
+    let balanced = balance(state, trials, progress)?;
     let Some(place) = chosen(state, &evidences(state, trials, before, &balanced)?) else {
         return Ok(());
     };
@@ -163,8 +167,9 @@ fn examined(
     while let Some(place) = chosen(state, evidences) {
         let examined = examine(state, &trials[place], &evidences[place], progress)?;
         if examined.refusal.is_none() {
-            // what the declared model can explain is no effect
-            let is_finer = !state.is_rich && finer_grids_instead(state, &trials[place], progress)?;
+            // what the declared model can explain is no effect, unless the balance of forces shows it
+            let is_asked = !state.is_rich && !evidences[place].is_balanced;
+            let is_finer = is_asked && finer_grids_instead(state, &trials[place], progress)?;
             return Ok(if is_finer { Found::FinerGrids } else { Found::Effect { place } });
         }
         evidences[place].doubt = examined.refusal;
@@ -231,8 +236,12 @@ pub(super) fn add(
 }
 
 /// What the balance of forces says of each trial.
-fn balance(state: &SearchState, trials: &[Trial]) -> Result<Vec<Option<Balanced>>, Error> {
-    trials.iter().map(|trial| balanced(state, trial)).collect()
+fn balance(
+    state: &SearchState,
+    trials: &[Trial],
+    progress: Progress,
+) -> Result<Vec<Option<Balanced>>, Error> {
+    trials.iter().map(|trial| balanced(state, trial, progress)).collect()
 }
 
 /// Trials in numbers, with the held-out squares before them.
@@ -257,7 +266,7 @@ fn evidence<'a>(
     before: &'a [f64],
     balanced: Option<&'a Balanced>,
 ) -> Result<Evidence<'a>, Error> {
-    let is_worse = trial.held_out.iter().sum::<f64>() > before.iter().sum::<f64>();
+    let is_worse = balanced.is_some_and(|own| own.is_worse);
     let of_output = ([state.cost, trial.cost], [before, &trial.held_out[..]]);
     let (squares, held_out) =
         balanced.map_or(of_output, |own| (own.squares, [&own.held_out[0][..], &own.held_out[1]]));
@@ -266,7 +275,7 @@ fn evidence<'a>(
     // the many terms of an expansion follow what a finite number of plays leaves
     let is_misfit =
         trial.entry.is_expansion && state.cost <= state.setup.policy.grid.at_noise * noise;
-    let unconfirmed = (balanced.is_some() && is_worse).then_some(Refusal::Unconfirmed);
+    let unconfirmed = is_worse.then_some(Refusal::Unconfirmed);
     Ok(Evidence {
         deviance: if balanced.is_some() {
             state.prepared.values() * (squares[0] / squares[1]).ln()
@@ -289,6 +298,7 @@ fn evidence<'a>(
         is_slow: trial.entry.signature == Signature::SlowInTime,
         is_added: trial.entry.stage == Stage::Added,
         is_expansion: trial.entry.is_expansion,
+        is_balanced: balanced.is_some(),
         is_integrated: balanced.is_none() && state.integrates()?,
         doubt: unconfirmed.or(is_misfit.then_some(Refusal::MisfitOfPlays)),
     })

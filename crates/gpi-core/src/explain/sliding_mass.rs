@@ -18,9 +18,9 @@
 //! small part of the squares of the model without it, of the training data and of what is held out. At the end of the search, each effect is
 //! examined as any other.
 
+use super::balance_start::{Straight, best, proposals};
 use super::examination::impossible;
 use super::force_balance::{Balance, balance};
-use super::forces::{begin, best, proposals, set_forces};
 use super::judgement::is_confirmed;
 use super::limits::with_loops;
 use super::moving::Motion;
@@ -64,17 +64,14 @@ fn sliding<'a>(
     state: &SearchState<'a>,
     progress: Progress,
 ) -> Result<Option<SearchState<'a>>, Error> {
-    let Some(Machine { balance, entry, mut friction, stops }) = machine(state)? else {
+    let Some(straight) = Straight::of(state, &state.point) else { return Ok(None) };
+    let Some(Machine { balance, entry, friction, stops }) = machine(state, &straight)? else {
         return Ok(None);
     };
     let policy = &state.setup.policy;
-    let straight = state.point.without_hysteresis(&state.prepared.record);
-    let (delay, gain) = (straight.dynamics.delay, straight.channels[0].slope());
-    let growth = (policy.balance.slowest / state.prepared.record.scored() as f64).exp();
-    let Ok(dynamics) = balance.dynamics(gain, delay, growth) else { return Ok(None) };
-    let forces: Vec<f64> = balance.forces.iter().map(|force| gain * force).collect();
-    set_forces(&mut friction, &forces, &dynamics);
-    let point = begin(state, &straight, dynamics, Some(friction));
+    let Some((point, _)) = straight.at_balance(state, &balance, friction) else {
+        return Ok(None);
+    };
     let options = &state.setup.options;
     let point = settled(point, &state.prepared.record, options, entry.name, progress)?;
     let alone = of_start(state, entry, point.clone(), progress)?;
@@ -100,7 +97,7 @@ fn sliding<'a>(
 /// The machine that the balance of forces shows. None where the model is near the noise, has forces inside the mechanics already, or is
 /// held by the user, and where the output integrates the input: forces are then judged by the balance alone, and the overlap of a
 /// valve does to it what friction does.
-fn machine(state: &SearchState) -> Result<Option<Machine>, Error> {
+fn machine(state: &SearchState, straight: &Straight) -> Result<Option<Machine>, Error> {
     let (record, policy) = (&state.prepared.record, &state.setup.policy);
     let moving = &state.setup.moving;
     let is_single = record.outputs().len() == 1 && record.inputs().len() == 1;
@@ -114,13 +111,12 @@ fn machine(state: &SearchState) -> Result<Option<Machine>, Error> {
     {
         return Ok(None);
     }
-    let straight = state.point.without_hysteresis(record);
-    let (delay, gain) = (straight.dynamics.delay, straight.channels[0].slope());
+    let delay = straight.delay();
     let shown = || {
         let motion = Motion::of(record, &policy.sliding)?;
         let moving = motion.moving(record)?;
         let linear = balance(&moving, delay, &[], &policy.balance)?;
-        let linear = linear.dynamics(gain, delay, 1.0).ok()?;
+        let linear = straight.dynamics(&linear)?;
         let is_refused =
             |entry: &Entry| state.refused.iter().any(|rejected| rejected.effect == entry.name);
         let is_asked = |entry: &&Entry| entry.stage == Stage::Dynamics && !is_refused(entry);
@@ -148,7 +144,7 @@ fn machine(state: &SearchState) -> Result<Option<Machine>, Error> {
         let is_friction = stops.is_some() || balance.explained >= policy.sliding.alone;
         is_friction.then_some(Machine { balance, entry, friction, stops })
     };
-    Ok(if gain == 0.0 { None } else { shown() })
+    Ok(shown())
 }
 
 /// Whether the forces of an effect oppose a motion whatever its speed, and nothing else.

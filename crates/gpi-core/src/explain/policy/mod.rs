@@ -11,7 +11,7 @@ pub(crate) use answer::{NoisePolicy, OutsidePolicy, ProposalPolicy, ResonancePol
 pub(crate) use decisions::{ExaminationPolicy, JudgementPolicy, RevisionPolicy};
 pub(crate) use search::{
     BalancePolicy, FitPolicy, GridPolicy, HoldoutPolicy, LimitPolicy, RankingPolicy, SlidingPolicy,
-    StepsPolicy,
+    StepsPolicy, StretchPolicy,
 };
 
 use crate::Error;
@@ -31,6 +31,8 @@ pub(crate) struct SearchPolicy {
     pub steps: StepsPolicy,
     /// Which forces inside the mechanics are fitted too.
     pub balance: BalancePolicy,
+    /// The last fit of a stage that integrates forces.
+    pub stretches: StretchPolicy,
     /// Fits that begin at limits of states.
     pub limits: LimitPolicy,
     /// Masses that slide with dry friction.
@@ -60,6 +62,7 @@ impl SearchPolicy {
         self.fits.validate()?;
         self.steps.validate()?;
         self.balance.validate()?;
+        self.stretches.validate()?;
         self.limits.validate()?;
         self.sliding.validate()?;
         self.judgement.validate()?;

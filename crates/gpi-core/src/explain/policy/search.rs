@@ -155,6 +155,21 @@ settings! {
         out_of_reach: f64 = 4.0, FROM_ONE;
     }
 
+    /// The last fit of a stage that integrates forces, see [`stretches`](super::super::stretches).
+    struct StretchPolicy {
+        /// Lengths of the stretches of one fit after the other, in time constants m/c of the speed. By hand: after five, 1 % of a wrong
+        /// initial speed is left, and in a short stretch a simulation follows the measured motion from the beginning.
+        time_constants: [f64; 2] = [5.0, 10.0], POSITIVE;
+        /// Stretches of the longest experiment, at most and at least. By hand: each has an initial state of its own, and with fewer than
+        /// three a simulation adds up errors as over the whole record.
+        most: usize = 20, FROM_ONE;
+        least: usize = 3, FROM_ONE;
+        /// Steps of each fit. By hand: a force that stops a mass has kinks, at which steps are short.
+        steps: usize = 200, FROM_ONE;
+        /// Steps of fits of initial states alone. By hand: the output is nearly linear in them.
+        settling_steps: usize = 12, FROM_ONE;
+    }
+
     /// When a mass is said to slide, see [`sliding_mass`](super::super::sliding_mass).
     struct SlidingPolicy {
         /// The rms change of the output over the samples that tell motion from rest, over its standard deviation, and the part of that
