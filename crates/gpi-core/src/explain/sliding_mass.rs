@@ -59,29 +59,59 @@ pub(super) fn add_sliding_mass(state: &mut SearchState, progress: Progress) -> R
     Ok(true)
 }
 
-/// The state with what the balance of forces shows, if that is taken.
+/// The state with what the balance of forces shows, if that is taken: without effects that the input drives, which may have stood for
+/// the mass and are found again if they did not, or else beside them.
 fn sliding<'a>(
     state: &SearchState<'a>,
     progress: Progress,
 ) -> Result<Option<SearchState<'a>>, Error> {
     let Some(straight) = Straight::of(state, &state.point) else { return Ok(None) };
-    let Some(Machine { balance, entry, friction, stops }) = machine(state, &straight)? else {
-        return Ok(None);
-    };
+    let Some(machine) = machine(state, &straight)? else { return Ok(None) };
+    let mut bare = state.under(state.setup)?;
+    let mut dropped = Vec::new();
+    while let Some(place) = bare.point.effects.iter().position(may_stand_for_mass) {
+        dropped.push(bare.point.effects[place].name());
+        bare.point = bare.point.without_effect(place);
+    }
+    if !dropped.is_empty() {
+        bare.cost = bare.training_squares(&bare.point)?;
+        if let Some(mut next) = with_machine(state, &bare, &machine, progress)? {
+            if let Some(addition) = next.additions.last_mut() {
+                addition.dropped.extend(dropped);
+            }
+            return Ok(Some(next));
+        }
+    }
+    with_machine(state, state, &machine, progress)
+}
+
+/// Whether an effect may be what the hysteresis before the dynamics does not explain of a mass: the input drives it, and no column of the
+/// record does.
+fn may_stand_for_mass(effect: &Effect) -> bool {
+    effect.entry().driven && effect.entry().stage != Stage::Added
+}
+
+/// A state with a machine in the place of its hysteresis, if that is taken instead of the present state.
+fn with_machine<'a>(
+    present: &SearchState<'a>,
+    state: &SearchState<'a>,
+    Machine { balance, entry, friction, stops }: &Machine,
+    progress: Progress,
+) -> Result<Option<SearchState<'a>>, Error> {
     let policy = &state.setup.policy;
-    let Some((point, _)) = straight.at_balance(state, &balance, friction) else {
-        return Ok(None);
-    };
+    let begun = Straight::of(state, &state.point)
+        .and_then(|straight| straight.at_balance(state, balance, friction.clone()));
+    let Some((point, _)) = begun else { return Ok(None) };
     let options = &state.setup.options;
     let point = settled(point, &state.prepared.record, options, entry.name, progress)?;
     let alone = of_start(state, entry, point.clone(), progress)?;
     if let Some((limit, ends)) = stops {
         let mut next = state.under(state.setup)?;
         next.add(Addition::alone(alone.clone()))?;
-        if let Some(stopped) = stopped(&next, &point, &ends, limit, progress)? {
+        if let Some(stopped) = stopped(&next, &point, ends, limit, progress)? {
             let both = of_start(&next, limit, stopped, progress)?;
             add(&mut next, Addition::alone(both), progress)?;
-            if is_taken(state, &next, &[entry, limit], progress)? {
+            if is_taken(present, &next, &[entry, limit], progress)? {
                 return Ok(Some(next));
             }
         }
@@ -91,7 +121,7 @@ fn sliding<'a>(
     }
     let mut next = state.under(state.setup)?;
     add(&mut next, Addition::alone(alone), progress)?;
-    Ok(is_taken(state, &next, &[entry], progress)?.then_some(next))
+    Ok(is_taken(present, &next, &[entry], progress)?.then_some(next))
 }
 
 /// The machine that the balance of forces shows. None where the model is near the noise, has forces inside the mechanics already, or is
