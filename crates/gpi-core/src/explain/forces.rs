@@ -155,7 +155,7 @@ pub(super) fn balanced(
     let Some(closed) = closed.filter(|_| state.prepared.record.outputs().len() == 1) else {
         return Ok(None);
     };
-    if !state.integrates()? || state.is_near(&state.point)? {
+    if !state.adds_up_forces(&state.point)? {
         return Ok(None);
     }
     let (record, delay) = (&state.prepared.record, point.dynamics.delay);

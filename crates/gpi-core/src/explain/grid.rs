@@ -52,9 +52,7 @@ pub(super) fn refine_grids(state: &mut SearchState, progress: Progress) -> Resul
     state.is_rich = true;
     let is_held = !state.setup.moving.half_widths && !state.setup.moving.thresholds;
     // a simulation adds up all forces that the model does not know, and plays would follow their sum
-    let adds_up = state.point.loops().next().is_some()
-        && state.integrates()?
-        && !state.is_near(&state.point)?;
+    let adds_up = state.point.loops().next().is_some() && state.adds_up_forces(&state.point)?;
     if is_held || adds_up {
         return Ok(false);
     }

@@ -99,7 +99,7 @@ fn fitted(
     // one that diverges on what is held out predicts nothing
     fits.retain(|trial| trial.held_out.iter().all(|squares| squares.is_finite()));
     fits.sort_by(|a, b| (b.deviance - b.threshold).total_cmp(&(a.deviance - a.threshold)));
-    if state.integrates()? && !state.is_near(&state.point)? {
+    if state.adds_up_forces(&state.point)? {
         // that which began at the balance of forces, whatever the squares
         fits.sort_by_key(|trial| !trial.is_far);
     }

@@ -281,6 +281,12 @@ impl<'a> SearchState<'a> {
         Ok(*self.integrates.get_or_init(|| found))
     }
 
+    /// Whether the error of a point is mostly a sum of forces that it lacks: the output integrates the input, and the point is far from
+    /// the noise.
+    pub(super) fn adds_up_forces(&self, point: &Point) -> Result<bool, Error> {
+        Ok(self.integrates()? && !self.is_near(point)?)
+    }
+
     /// Whether the model is near the noise, and its dynamics forget within a part of the record: then the output does not integrate,
     /// even if a hysteresis resembles an integral of the input.
     fn forgets(&self) -> Result<bool, Error> {

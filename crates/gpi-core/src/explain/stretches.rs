@@ -32,14 +32,18 @@ use std::ops::Range;
 /// What the progress calls these fits.
 const PHASE: &str = "refinement";
 
-/// The model of a stage that integrates the forces of one effect, fitted in stretches, and what was free. `None` where the output does not
-/// integrate the input, the model is near the noise, where a fit of the whole record is the best one, or it has more than the input,
-/// its dynamics and these forces; and where a fit of the whole record leaves less of the same stretches.
+/// The model of a stage that integrates the forces of one effect, fitted in stretches, and what was free. `None` in these cases:
+///
+/// - The output does not integrate the input.
+/// - The model is near the noise. A fit of the whole record is the best one there.
+/// - The model has plays, deadzones, functions of time, or more than one effect with forces.
+/// - The record is too short for stretches.
+/// - The model so far, which was fitted to the whole record, leaves less of the same stretches.
 pub(super) fn in_stretches(
     state: &SearchState,
     progress: Progress,
 ) -> Result<Option<(Fitted, FitOptions)>, Error> {
-    if !state.integrates()? || state.is_near(&state.point)? {
+    if !state.adds_up_forces(&state.point)? {
         return Ok(None);
     }
     let Some((start, time_constant)) = begin(state) else { return Ok(None) };

@@ -55,7 +55,7 @@ pub(super) fn doubt(
             | Place::Added(_)
     );
     if let Place::Curves(_) = of {
-        let adds_up = state.integrates()? && !state.is_near(point)?;
+        let adds_up = state.adds_up_forces(point)?;
         return Ok(adds_up.then_some(Refusal::ResemblesMisfit));
     }
     if !is_asked || entry.signature == Signature::Unique || entry.free_order == FreeOrder::JoinsG {
